@@ -1,4 +1,5 @@
-// Plans changed in flight, as they are asked for.
+// Plans changed and anchors accepted in flight, as they are asked for.
+#include <algorithm>
 #include <utility>
 
 #include "api/flight/flight_state.hpp"
@@ -98,6 +99,26 @@ Result<FlightService::PlanDifference> FlightService::take_plan(const MissionId& 
     return PlanDifference{std::move(basis->plan), std::move(proposal)};
   }
   return cannot("the flight moves on faster than the change can be checked: hold, then take it");
+}
+
+Result<void> FlightService::accept_anchor(const MissionId& mission, NetworkId anchor, bool undo,
+                                          const std::string& lease, const Principal& who) {
+  BOOST_OUTCOME_TRYV(renew_control(mission, lease, who));
+  // Estimates are read before the lock is taken: their strand asks for it.
+  if (!undo) {
+    for (const auto& view : state_->deps.missions.live(mission)) {
+      const auto e = std::ranges::find(view.estimates, anchor, &Estimate::anchor);
+      if (e == view.estimates.end() || !e->best) return cannot(to_string(anchor) + " has no position yet");
+      if (e->verdict == Verdict::ambiguous)
+        return cannot(
+            to_string(anchor) +
+            " is ambiguous: it may as well be at its mirror solution, fly another side of it first");
+    }
+  }
+  auto w = state_->work.lock();
+  BOOST_OUTCOME_TRYV(w->operations.accept_anchor(state_->now(), mission, anchor, undo, who.name));
+  state_->publish_events(*w);
+  return boost::outcome_v2::success();
 }
 
 void FlightService::plan_saved(const Plan& plan) {

@@ -37,6 +37,7 @@ Ordered anchors_json(const procedure::FlightEngine& engine) {
     out.push_back({{"network_id", to_string(a.id)},
                    {"done", a.done},
                    {"reached", a.reached},
+                   {"accepted_by", a.accepted_by.empty() ? Ordered(nullptr) : Ordered(a.accepted_by)},
                    {"why", a.why},
                    {"iterations", a.iterations},
                    {"waiting", a.waiting},
@@ -228,6 +229,7 @@ Ordered stored_state(const procedure::State& s) {
                        {"waiting", a.waiting},
                        {"done", a.done},
                        {"reached", a.reached},
+                       {"accepted_by", a.accepted_by},
                        {"why", a.why}});
   }
   return {{"step", procedure::to_string(s.step)},
@@ -285,6 +287,7 @@ std::optional<procedure::State> state_of(const nlohmann::json& j) {
       a.at("waiting").get_to(task.waiting);
       a.at("done").get_to(task.done);
       task.reached = a.value("reached", false);
+      task.accepted_by = a.value("accepted_by", "");
       a.at("why").get_to(task.why);
       s.anchors.push_back(std::move(task));
     }

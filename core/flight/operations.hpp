@@ -175,6 +175,10 @@ class Operations {
   /// errors  invalid_argument: refused, with every reason
   Result<bool> take_plan(const Now& now, const MissionId& mission, const ChangeBasis& basis,
                          const PlanProposal& proposal, const std::string& who);
+  /// FlightEngine::accept(), in flight.
+  /// errors  invalid_argument: not flown, or of that anchor nothing came, or it was not accepted
+  Result<void> accept_anchor(const Now& now, const MissionId& mission, NetworkId anchor, bool undo,
+                             const std::string& who);
   /// A revision was stored that is not flown, should a flight fly this plan.
   void plan_saved(const PlanId& plan, const std::string& name, std::uint64_t revision);
   Result<FlightCommand> upload(const Now& now, const MissionId& mission, const Plan& plan,

@@ -1,4 +1,5 @@
-// A plan changed in flight: who asks, what it stands on, and from when it is flown.
+// What a person changes in flight: the plan (who asks, what it stands on, from when it is flown), and anchors
+// that are accepted.
 #include <utility>
 
 #include "core/flight/operations.hpp"
@@ -58,6 +59,23 @@ Result<bool> Operations::take_plan(const Now& now, const MissionId& mission, con
   take_events(f);
   show_soon_ = true;
   return true;
+}
+
+Result<void> Operations::accept_anchor(const Now& now, const MissionId& mission, NetworkId anchor, bool undo,
+                                       const std::string& who) {
+  const auto* flown = flight_of(mission);
+  if (flown == nullptr || !flown->flying())
+    return make_error(
+        Errc::invalid_argument,
+        "this mission is not being flown: anchors of a finished flight are accepted in its review");
+  auto& f = *flight_;
+  if (!f.control.engine().accept(now.s, anchor, undo ? std::string{} : who))
+    return make_error(Errc::invalid_argument,
+                      undo ? to_string(anchor) + " was not accepted by hand"
+                           : "no range of " + to_string(anchor) + " has come in this flight");
+  take_events(f);
+  show_soon_ = true;
+  return boost::outcome_v2::success();
 }
 
 void Operations::plan_saved(const PlanId& plan, const std::string& name, std::uint64_t revision) {

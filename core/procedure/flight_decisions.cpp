@@ -12,7 +12,7 @@ std::string FlightEngine::outcome(const std::string& which) const {
   std::string without;
   std::size_t n = 0;
   for (const auto& task : state_.anchors) {
-    if (!task.done || task.reached) continue;
+    if (!task.done || task.reached || !task.accepted_by.empty()) continue;
     ++n;
     without += (without.empty() ? "" : ", ") + to_string(task.id);
   }
@@ -142,6 +142,18 @@ bool FlightEngine::next_is_current() const {
   return step == Step::go_to_waypoint || step == Step::take_off;
 }
 
+bool FlightEngine::accept(double now_s, NetworkId anchor, const std::string& who) {
+  const auto task = std::ranges::find(state_.anchors, anchor, &AnchorTask::id);
+  if (task == state_.anchors.end() || (who.empty() && task->accepted_by.empty())) return false;
+  task->done = !who.empty();
+  task->reached = false;
+  task->why = who.empty() ? "assessed again at the next point" : "accepted by " + who;
+  task->accepted_by = who;
+  report(now_s, EventLevel::info, who.empty() ? "anchor.reopened" : "anchor.accepted",
+         to_string(anchor) + ": " + task->why);
+  return true;
+}
+
 void FlightEngine::change_plan(double now_s, FlightSetup setup, std::size_t waypoint,
                                const std::string& why) {
   const ExitRule &was = setup_.exit, &is = setup.exit;
@@ -153,7 +165,7 @@ void FlightEngine::change_plan(double now_s, FlightSetup setup, std::size_t wayp
   asked_.reset();
   answer_.reset();
   for (auto& task : state_.anchors) {
-    if (!task.done || !other_aim) continue;
+    if (!task.done || !other_aim || !task.accepted_by.empty()) continue;
     task.done = task.reached = false;
     task.why = "assessed again at the next point: the plan was changed";
   }

@@ -183,8 +183,9 @@ struct AnchorTask {
   int waiting{};        ///< points since it was ranged last: the planner serves who waits longest first
   int samples_here{};
   bool done{false};
-  bool reached{false};  ///< its accuracy; done without it: a limit ended it
-  std::string why;      ///< why it is done, or why not yet
+  bool reached{false};      ///< its accuracy; done without it: a limit ended it
+  std::string why;          ///< why it is done, or why not yet
+  std::string accepted_by;  ///< the person who ended the work on it, with the accuracy it had
   bool operator==(const AnchorTask&) const = default;
 };
 

@@ -211,6 +211,46 @@ TEST_F(PlanInFlight, OtherTargetsAndAnchorsCountAtOnce) {
   EXPECT_EQ(procedure()["target_sigma_m"], 0.02);
 }
 
+TEST_F(PlanInFlight, AnAnchorAcceptedByHandIsWorkedOnNoMoreUntilThatIsTakenBack) {
+  const auto lease = take_off();
+  const auto accept = [&](const std::string& anchor, const std::string& key, const std::string& more = "") {
+    return post(base() + "/anchors/" + anchor + "/accept", R"({"lease":")" + key + '"' + more + '}');
+  };
+  EXPECT_EQ(accept("0x6a21", lease).status, 422) << "nothing of it has come";
+  EXPECT_EQ(accept("anchor", lease).status, 422);
+  const auto known = [&] {
+    const Json tasks = procedure()["anchors"];
+    return std::ranges::any_of(tasks,
+                               [&](const Json& a) { return accept(a["network_id"], lease).status == 204; });
+  };
+  ASSERT_TRUE(fly_until(known, 200));
+  const auto accepted = [&] {
+    const Json tasks = procedure()["anchors"];
+    for (const auto& a : tasks)
+      if (!a["accepted_by"].is_null()) return a;
+    return Json();
+  };
+  const Json task = accepted();
+  EXPECT_EQ(task["accepted_by"], "tester");
+  EXPECT_EQ(task["done"], true);
+  EXPECT_EQ(task["reached"], false) << "the accuracy that was wanted is not there";
+  EXPECT_EQ(task["weight"], 0.0);
+  const std::string anchor = task["network_id"];
+  EXPECT_EQ(accept(anchor, "somebody else", R"(,"undo":true)").status, 409);
+  ASSERT_EQ(accept(anchor, lease, R"(,"undo":true)").status, 204);
+  EXPECT_TRUE(accepted().is_null());
+  EXPECT_EQ(accept(anchor, lease, R"(,"undo":true)").status, 422) << "nothing to take back";
+  ASSERT_EQ(accept(anchor, lease).status, 204);
+  fly(0.5);
+  EXPECT_EQ(events_of("anchor.accepted").size(), 2u);
+  EXPECT_EQ(events_of("anchor.reopened").size(), 1u);
+  app_.reset();
+  database_.reset();
+  open();
+  fly(0.5);
+  EXPECT_EQ(accepted()["network_id"], anchor) << "kept over a restart";
+}
+
 TEST_F(PlanInFlight, TheFenceThatTheAutopilotKeepsIsNotChangedInTheAir) {
   mission_ = mission();
   const auto plan = make_plan(R"("fence":)" + box(-40, -40, 70, 60).dump() + ',');

@@ -1,101 +1,17 @@
 // ./dev bench dashboard: the real page in the real Chromium while 50 anchors answer at 100 ranges a second: frames a second, 95 % of frame times, long
 // tasks, bytes a second of each topic, age of the data when it is in the page. Once as it is, once at a quarter of the CPU, once over a link of
-// 1 Mbit/s and 300 ms (a network namespace of its own, shaped by tc; without that right Chromium's own emulation, and the table says so).
+// 1 Mbit/s and 300 ms (a network namespace of its own, shaped by tc; without that right a shaping proxy, and the table says so).
 import { execFileSync, spawn } from 'node:child_process';
-import { request } from 'node:http';
 import { existsSync } from 'node:fs';
 import { fileURLToPath } from 'node:url';
 import { openBrowser, openPage } from '../e2e/browser.mjs';
+import { feeder, feeder_args, fly_fifty, watch_ages } from '../e2e/fifty_anchors.mjs';
 import { eventually, startServer } from '../e2e/server.mjs';
+import { slowLink } from '../e2e/slow_link.mjs';
 import { percentile } from './load.mjs';
 
-const k_anchors = 50,
-  k_ranges_per_s = 100,
-  k_fixes_per_s = 10,
-  k_tick_ms = 50,
-  k_warm_s = 45,
+const k_warm_s = 45,
   k_measure_s = 20;
-const k_feeder = '127.0.0.3'; // its packets are not those of the screen: they are not shaped
-const k_lat = 51.0231,
-  k_lon = 3.7131,
-  k_m_per_deg = 111_250,
-  k_m_per_deg_lon = 70_000;
-const anchors = Array.from({ length: k_anchors }, (_, i) => ({
-  id: `0x${(0x6b00 + i).toString(16)}`,
-  e: (i % 10) * 4 + 2,
-  n: Math.floor(i / 10) * 4 + 2,
-  u: 2.5 + (i % 3),
-}));
-const tag_at = (s) => {
-  const angle = (2 * Math.PI * s) / 40;
-  return { e: 20 + 30 * Math.cos(angle), n: 10 + 20 * Math.sin(angle), u: 6 + 4 * Math.sin(angle / 3) };
-};
-const now_us = () => Math.round((performance.timeOrigin + performance.now()) * 1000);
-
-function send(server, path, body, type = 'application/x-ndjson') {
-  return new Promise((done, fail) => {
-    const asked = request(
-      {
-        host: '127.0.0.1',
-        port: server.port,
-        path,
-        method: 'POST',
-        localAddress: k_feeder,
-        headers: { 'content-type': type },
-      },
-      (answer) => {
-        let text = '';
-        answer.setEncoding('utf8').on('data', (part) => (text += part));
-        answer.on('end', () => (answer.statusCode < 300 ? done(JSON.parse(text)) : fail(new Error(text))));
-      },
-    );
-    asked.on('error', fail);
-    asked.end(body);
-  });
-}
-
-/** Flies round the hall in real time until stopped. */
-function fly(server, mission) {
-  const start = performance.now();
-  let n_ranges = 0,
-    n_fixes = 0;
-  const lines = (rows) => rows.map((r) => JSON.stringify(r)).join('\n') + '\n';
-  const timer = setInterval(() => {
-    const s = (performance.now() - start) / 1000,
-      at = tag_at(s),
-      fixes = [],
-      ranges = [];
-    while (n_fixes < s * k_fixes_per_s)
-      fixes.push({
-        t_us: now_us(),
-        mission,
-        seq: n_fixes++,
-        lon: k_lon + at.e / k_m_per_deg_lon,
-        lat: k_lat + at.n / k_m_per_deg,
-        h_m: 50 + at.u,
-        fix: 'fixed',
-        sigma_m: [0.01, 0.01, 0.02],
-        q: [0, 0, 0, 1],
-      });
-    while (n_ranges < s * k_ranges_per_s) {
-      const a = anchors[n_ranges % k_anchors],
-        noise = 0.05 * Math.sin(n_ranges * 12.9898);
-      ranges.push({
-        t_us: now_us(),
-        mission,
-        tag: '0x6e01',
-        anchor: a.id,
-        seq: n_ranges++,
-        distance_m: Number((Math.hypot(at.e - a.e, at.n - a.n, at.u - a.u) + noise).toFixed(3)),
-        rss_dbm: -84.3,
-      });
-    }
-    // A round that is refused is a round without data: the table tells.
-    if (fixes.length) void send(server, '/api/v1/fixes', lines(fixes)).catch(() => undefined);
-    if (ranges.length) void send(server, '/api/v1/ranges', lines(ranges)).catch(() => undefined);
-  }, k_tick_ms);
-  return () => clearInterval(timer);
-}
 
 /** Frame times and long tasks of the page for so long. */
 const frames_of = (page, seconds) =>
@@ -122,20 +38,12 @@ const frames_of = (page, seconds) =>
     seconds * 1000,
   );
 
-async function measure(browser, server, name, { slowdown = 1, emulated = false }, row) {
+async function measure(browser, server, name, { slowdown = 1 }, row) {
   const { page, id } = await openPage(browser, server);
   const cdp = await page.context().newCDPSession(page);
   await cdp.send('Network.enable');
-  if (emulated)
-    await cdp.send('Network.emulateNetworkConditions', {
-      offline: false,
-      latency: 300,
-      downloadThroughput: 125_000,
-      uploadThroughput: 125_000,
-    });
   const topics = new Map(),
-    bytes = new Map(),
-    ages = [];
+    bytes = new Map();
   let counting = false;
   const asked = new Map();
   cdp.on('Network.webSocketFrameSent', ({ response }) => {
@@ -151,7 +59,6 @@ async function measure(browser, server, name, { slowdown = 1, emulated = false }
     if (!counting) return;
     const topic = topics.get(sub) ?? op;
     bytes.set(topic, (bytes.get(topic) ?? 0) + text.length);
-    if (op === 'data' && topic === 'ranges') ages.push((now_us() - Number(/"t_us":(\d+)/.exec(head)[1])) / 1000);
   });
   await page.reload();
   await eventually(
@@ -162,14 +69,16 @@ async function measure(browser, server, name, { slowdown = 1, emulated = false }
   );
   await cdp.send('Emulation.setCPUThrottlingRate', { rate: slowdown });
   await new Promise((done) => setTimeout(done, 5000)); // what was opened is drawn
+  await page.evaluate(() => (globalThis.range_ages.length = 0));
   counting = true;
   const { times, tasks, passed_ms } = await frames_of(page, k_measure_s);
   counting = false;
+  const ages = (await page.evaluate(() => globalThis.range_ages)).map(([, age_ms]) => age_ms).sort((a, b) => a - b);
   const s = passed_ms / 1000,
     sorted = [...times].sort((a, b) => a - b),
     kb = (topic) => ((bytes.get(topic) ?? 0) / s / 1000).toFixed(1),
     total = [...bytes.values()].reduce((a, b) => a + b, 0) / s / 1000,
-    limit = slowdown > 1 ? 'limit 30 fps' : emulated || name.includes('Mbit') ? '' : 'limit 60 fps, p95 20 ms';
+    limit = slowdown > 1 ? 'limit 30 fps' : name.includes('Mbit') ? '' : 'limit 60 fps, p95 20 ms';
   row(`${name}: frames`, `${(times.length / s).toFixed(0)} fps, p95 ${percentile(sorted, 0.95).toFixed(1)} ms`, limit);
   row(
     `${name}: tasks of 50 ms and more`,
@@ -232,7 +141,7 @@ function shape(port) {
     on('tc', 'qdisc', 'add', 'dev', 'lo', 'parent', '20:1', 'handle', '30:', 'netem', 'delay', '150ms', 'limit', '80');
     const filter = ['tc', 'filter', 'add', 'dev', 'lo', 'parent', '1:', 'protocol', 'ip'];
     for (const end of ['src', 'dst'])
-      on(...filter, 'prio', '1', 'u32', 'match', 'ip', end, `${k_feeder}/32`, 'flowid', '1:1');
+      on(...filter, 'prio', '1', 'u32', 'match', 'ip', end, `${feeder}/32`, 'flowid', '1:1');
     for (const end of ['sport', 'dport'])
       on(...filter, 'prio', '2', 'u32', 'match', 'ip', end, String(port), '0xffff', 'flowid', '1:2');
     return true;
@@ -242,27 +151,23 @@ function shape(port) {
 }
 
 async function fly_and_measure(row, views, shaped) {
-  const server = await startServer({ args: ['--rate-per-s', '100000', '--rate-burst', '100000'] });
+  const server = await startServer({ args: feeder_args });
   let stop = () => undefined,
-    browser;
+    browser,
+    link;
   try {
-    const body = {
-      name: 'fifty anchors',
-      kit: 'bench',
-      frame: 'wgs84',
-      track_point: 'gnss_antenna',
-      tags: [{ tag: '0x6e01', antenna: 0, lever_arm_body_m: [0, 0, 0] }],
-    };
-    const { id } = await send(server, '/api/v1/missions', JSON.stringify(body), 'application/json');
-    stop = fly(server, id);
+    ({ stop } = await fly_fifty(server));
     await new Promise((done) => setTimeout(done, k_warm_s * 1000));
-    const emulated = shaped && !shape(server.port);
-    if (emulated) row('link of 1 Mbit/s', 'emulated by Chromium', 'tc cannot shape a network namespace here');
+    link = shaped && !shape(server.port) ? await slowLink(server.port) : null;
+    if (link) row('link of 1 Mbit/s', 'a proxy', 'tc cannot shape a network namespace here');
+    const screen = link ? { url: `http://127.0.0.1:${link.port}` } : server;
     browser = await openBrowser();
-    for (const [name, how] of views) await measure(browser, server, name, { ...how, emulated }, row);
+    await browser.context.addInitScript(watch_ages);
+    for (const [name, how] of views) await measure(browser, screen, name, how, row);
   } finally {
     stop();
     await browser?.close();
+    await link?.close();
     await server.dispose();
   }
 }

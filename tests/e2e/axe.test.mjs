@@ -1,65 +1,19 @@
 // What axe finds, in every view, every theme and every size: nothing, the sizes of targets among it. One server with something in each view.
 import assert from 'node:assert/strict';
-import { mkdtempSync, readFileSync, rmSync } from 'node:fs';
-import { tmpdir } from 'node:os';
-import { join } from 'node:path';
 import { after, before, test } from 'node:test';
 import { openBrowser, openPage, picture, violations } from './browser.mjs';
-import { hall_outline } from './flight.mjs';
-import { eventually, root, run, startServer } from './server.mjs';
+import { fullServer, sizes, views } from './full_server.mjs';
+import { eventually } from './server.mjs';
 
-const folder = mkdtempSync(join(tmpdir(), 'anchord axe ')),
-  sizes = [
-    ['desk', 1440, 900],
-    ['laptop', 1024, 768],
-    ['tablet', 768, 1024],
-    ['phone', 390, 844],
-  ],
-  views = ['live', 'plan', 'anchors', 'measurements', 'models', 'replay', 'system', 'guide'];
 let browser, server;
-const post = async (path, json, headers = {}) => {
-  const answer = await server.fetch(path, { json, headers });
-  assert.ok(answer.ok, `${path}: ${answer.status} ${await answer.clone().text()}`);
-  return answer.json();
-};
 
 before(async () => {
-  server = await startServer({ auth: 'off' });
-  const flight = join(folder, 'flight');
-  assert.equal((await run(['simulate', 'flight', '--seed', '7', '--duration', '60', '--out', flight])).code, 0);
-  const replayed = await run(['replay', flight, '--url', server.url, '--speed', 'max']);
-  assert.equal(replayed.code, 0, replayed.stderr);
-  const made = await post('/api/v1/plans/generate', {
-    name: 'Hall',
-    outline: hall_outline,
-    building_height_m: 8,
-    settings: { max_height_m: 14 },
-  });
-  await post('/api/v1/plans', made.plan);
-  await post('/api/v1/campaigns', { name: 'halls' });
-  const imported = await server.fetch('/api/v1/campaigns/halls/samples', {
-    method: 'POST',
-    headers: { 'content-type': 'text/csv' },
-    body: readFileSync(join(root, 'docs/examples/campaign.csv'), 'utf8'),
-  });
-  assert.equal(imported.status, 200, await imported.text());
-  await post('/api/v1/datasets', {
-    name: 'set',
-    campaigns: ['halls'],
-    aggregation: 'none',
-    split: { test: ['room 6'] },
-  });
-  await post(
-    '/api/v1/training-runs',
-    { task: 'nlos_id', dataset: 'set', methods: ['logistic'], cv: { folds: 4, seed: 7 } },
-    { prefer: 'wait=200' },
-  );
+  ({ server } = await fullServer());
   browser = await openBrowser();
 });
 after(async () => {
   await browser?.close();
   await server?.dispose();
-  rmSync(folder, { recursive: true, force: true });
 });
 
 /** What is wrong wherever the page is scrolled to: a bar at the bottom may half cover what can be scrolled out from under it. */

@@ -433,8 +433,7 @@ test('a flight by hand: control, checklist, start, hold, abort', async () => {
     await new Promise((resolve) => setTimeout(resolve, 100));
   }
   assert.equal(started.status, 202, started.text);
-  await call('GET', `${path}/procedure`, { expect: 200 });
-  await call('GET', `${path}/grid`, { expect: 200 });
+  for (const shown of ['procedure', 'grid']) await call('GET', `${path}/${shown}`, { expect: 200 });
   await call('POST', `${path}/actions`, { expect: 409, json: { action: 'hold', lease: 'not mine' } });
   await call('POST', `${path}/actions`, {
     expect: 202,
@@ -444,6 +443,7 @@ test('a flight by hand: control, checklist, start, hold, abort', async () => {
   await call('POST', `${path}/actions`, { expect: 202, json: { action: 'abort', lease } });
   await call('POST', `${path}/actions`, { expect: 202, json: { action: 'hold', lease } }); // always, whatever the server believes
   await call('POST', `${path}/actions`, { expect: 422, json: { action: 'return', lease } });
+  await call('POST', `${path}/anchors/0x6a21/accept`, { expect: 422, json: { lease } });
   await call('POST', `${path}/control`, { expect: 200, json: { action: 'release', lease } });
 });
 

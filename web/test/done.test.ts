@@ -35,6 +35,15 @@ describe('an anchor is done', () => {
     expect(as_shown(anchor('0x1', 'accepted'), flight([task('0x1', true, false)])).status).toBe('accepted');
     expect(as_shown(anchor('0x1', 'ambiguous'), flight([task('0x1', true, false)])).status).toBe('ambiguous');
   });
+  it('when a person accepted it in flight, unless it is ambiguous; and reads so, not given up', () => {
+    const p = flight([{ ...task('0x1', true, false, 'accepted by A. Pilot'), accepted_by: 'A. Pilot' }]);
+    expect(as_shown(anchor('0x1', 'estimating'), p).status).toBe('accepted');
+    expect(as_shown(anchor('0x1', 'ambiguous'), p).status).toBe('ambiguous');
+    const s = new Scene('m');
+    s.add_estimate(anchor('0x1', 'estimating'), 0);
+    s.add_procedure(p, 0);
+    expect(done_count(s, null)).toEqual({ done: 1, gave_up: 0, total: 1 });
+  });
   it('in one number for every place of a screen', () => {
     const s = new Scene('m');
     for (const id of ['0x1', '0x2', '0x3']) s.add_estimate(anchor(id, 'converged'), 0);

@@ -37,6 +37,14 @@ export const command = (
     headers: { 'Idempotency-Key': idempotency_key() },
   });
 
+/// Ends the work on an anchor with the accuracy that it has, or takes that back.
+export const accept_anchor = (mission: string, anchor: string, lease: string, undo: boolean): Promise<unknown> =>
+  call('post', '/missions/{id}/anchors/{anchor}/accept', {
+    path: { id: mission, anchor },
+    body: { lease, undo },
+    headers: { 'Idempotency-Key': idempotency_key() },
+  });
+
 export const checklist = async (mission: string, plan: string | null): Promise<ChecklistItem[]> =>
   (await get('/missions/{id}/checklist', { ...at(mission), query: plan ? { plan } : {} })).items;
 export const set_item = (mission: string, item: string, reason: string): Promise<unknown> =>

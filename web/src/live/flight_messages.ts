@@ -41,7 +41,8 @@ export interface CommandMsg {
 export interface AnchorTask {
   readonly anchor: string;
   readonly done: boolean;
-  readonly reached: boolean; // its accuracy; done without it: given up
+  readonly reached: boolean; // its accuracy; done without it: given up, or accepted by hand
+  readonly accepted_by: string; // empty: nobody did
   readonly why: string;
   readonly iterations: number;
   readonly at_edge: boolean;
@@ -222,6 +223,7 @@ export function procedure(v: unknown): ProcedureMsg | null {
       anchor: str(a.network_id),
       done: a.done === true,
       reached: a.reached === true,
+      accepted_by: str(a.accepted_by),
       why: str(a.why),
       iterations: count(a.iterations),
       at_edge: a.height_at_edge === true,

@@ -44,10 +44,11 @@ export function likelier(e: EstimateMsg): EstimateMsg {
 }
 
 /// The estimate with the status that is shown. While the aircraft still works on an anchor it is not done, and what ran out of time, points or
-/// battery, or was left by the end of the flight, was given up: neither is ever green.
+/// battery, or was left by the end of the flight, was given up: neither is ever green. What a person accepted in flight reads so.
 export function as_shown(given: EstimateMsg, p: ProcedureMsg | null | undefined): EstimateMsg {
   const e = likelier(given);
   const task = task_of(p, e.anchor);
+  if (task?.accepted_by && e.status !== 'ambiguous' && e.status !== 'moved') return { ...e, status: 'accepted' };
   if (!task || task.reached || e.status === 'accepted' || e.status === 'moved' || e.status === 'ambiguous') return e;
   if (task.done || over(p)) return { ...e, status: 'gave_up' };
   return e.status === 'converged' ? { ...e, status: 'estimating' } : e;
@@ -81,6 +82,12 @@ export function done_count(scene: Scene | null, m: MissionMsg | null): DoneCount
     total: Math.max(ids.size, m?.anchors_found ?? 0),
   };
 }
+/// Who accepted an anchor by hand in this flight; empty: nobody did.
+export const accepted_by = (p: ProcedureMsg | null | undefined, anchor: string): string =>
+  task_of(p, anchor)?.accepted_by ?? '';
+/// Whether the procedure still works on an anchor.
+export const works_on = (p: ProcedureMsg | null | undefined, anchor: string): boolean =>
+  task_of(p, anchor)?.done === false && !over(p);
 /// Why the procedure has not finished an anchor, in its own words; empty where it has, or does not know it.
 export function task_reason(p: ProcedureMsg | null | undefined, anchor: string): string {
   const t = task_of(p, anchor);

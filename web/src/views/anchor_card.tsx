@@ -1,12 +1,15 @@
 /// The selected anchor beside the map: state, why it is not done, its curve, its ellipse at true scale, its covariance.
 import type { EstimateMsg } from '../live/messages';
 import { sigma_h, sigma_v } from '../map/enu';
-import { shown_estimate, task_reason } from '../state/done';
-import { watched_mission, watched_scene, now_ms, tick, watched_lost } from '../state/store';
+import { accepted_by, shown_estimate, task_reason, works_on } from '../state/done';
+import { replayed, watched_mission, watched_scene, now_ms, tick, watched_lost } from '../state/store';
 import { accuracy, age, fixed, metres, percent } from '../ui/format';
 import { Chip, Q, StatusChip } from '../ui/marks';
 import { why_not_done } from '../ui/words';
 import { Convergence } from './convergence';
+import { HoldButton } from './flight/hold_button';
+import { accept, lease } from './flight/lease';
+import { flying } from './flight/words';
 import { Covariance, Loupe } from './loupe';
 
 export function AnchorCard({ anchor }: { anchor: string }) {
@@ -45,12 +48,45 @@ export function AnchorCard({ anchor }: { anchor: string }) {
         </div>
       )}
       {e.enu_m && <Figures e={e} stale={stale} />}
+      {!replayed.value && <AcceptInFlight e={e} />}
       <div class="pair detail">
         <Convergence anchor={anchor} />
         {e.ellipse95 && <Loupe e={e} />}
       </div>
       <div class="detail">{e.cov_enu_m2 && <Covariance c={e.cov_enu_m2} />}</div>
     </section>
+  );
+}
+
+/// A person may be content with an anchor before the procedure is: nothing more is flown for it. Whoever has control, and never of an ambiguous one.
+function AcceptInFlight({ e }: { e: EstimateMsg }) {
+  const p = watched_scene()?.procedure?.value,
+    by = accepted_by(p, e.anchor),
+    off = watched_lost() || lease.value?.mission !== e.mission;
+  if (!p || !flying(p) || (off && !by)) return null;
+  if (by)
+    return (
+      <p class="why" data-testid="accepted-by">
+        Accepted by {by}: nothing more is flown for it.{' '}
+        {!off && (
+          <button class="btn small" onClick={() => void accept(e.mission, e.anchor, true)}>
+            Work on it again
+          </button>
+        )}
+      </p>
+    );
+  if (!works_on(p, e.anchor) || !e.enu_m || e.status === 'ambiguous') return null;
+  return (
+    <p class="accept">
+      <HoldButton
+        testid="accept-anchor"
+        disabled={false}
+        note="hold 1 s"
+        onConfirm={() => void accept(e.mission, e.anchor, false)}
+      >
+        Accept {e.anchor} as it is
+      </HoldButton>
+    </p>
   );
 }
 

@@ -2,6 +2,7 @@
 import { effect, signal } from '@preact/signals';
 import { ApiError, error_text } from '../../api/client';
 import {
+  accept_anchor,
   ask_for_control,
   command,
   refuse_control,
@@ -64,6 +65,12 @@ export async function send(mission: string, action: Action, more: Parameters<typ
   if (lease.value?.mission !== mission && !(await take(mission, false))) return;
   await guarded(() => command(mission, action, lease.value!.key, more));
 }
+
+export const accept = (mission: string, anchor: string, undo: boolean): Promise<boolean> =>
+  guarded(async () => {
+    await accept_anchor(mission, anchor, lease.value?.key ?? '', undo);
+    say(undo ? `${anchor} is worked on again` : `${anchor} accepted`);
+  });
 
 let renewed_ms = 0,
   asking_now = false;

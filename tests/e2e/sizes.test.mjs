@@ -1,0 +1,73 @@
+// What each view is for is done at each size: desk, 1024 x 768, portrait tablet, phone. One server with something in each view; numbers against the API's.
+import assert from 'node:assert/strict';
+import { after, before, test } from 'node:test';
+import { openBrowser, openPage, picture, text } from './browser.mjs';
+import { fullServer, sizes } from './full_server.mjs';
+import { eventually } from './server.mjs';
+
+let browser, server, mission, training;
+const get = async (path) => (await server.fetch(path)).json();
+
+before(async () => {
+  ({ server, mission, training } = await fullServer());
+  browser = await openBrowser({ hasTouch: true });
+});
+after(async () => {
+  await browser?.close();
+  await server?.dispose();
+});
+
+for (const [size, width, height] of sizes)
+  test(`models, measurements, replay, review and plan work, ${size}`, async () => {
+    const { page, seen, id } = await openPage(browser, server, { width, height, hash: '#/models' }),
+      press = (name) => (width < 1000 ? id(name).tap() : id(name).click()),
+      open = async (view) => {
+        await press(`nav-${view}`);
+        await id(view).waitFor({ timeout: 20_000 });
+      };
+    // F11: the confusion is that of the API.
+    await id('confusion').waitFor({ timeout: 20_000 });
+    const c = (await get(`/api/v1/training-runs/${training.id}/confusion`)).test.confusion;
+    assert.deepEqual((await id('confusion').locator('tbody td b').allTextContents()).map(Number), [c.tp, c.fn, c.fp, c.tn]);
+    // F19: a measurement opens.
+    await open('measurements');
+    await eventually('rows are there', async () => (await id('rows').getByRole('row').count()) > 3, 20_000);
+    // F12: a jump of the replay shows that moment.
+    await page.evaluate((m) => (location.hash = `#/replay/${m}?t=20`), mission.id);
+    await id('scrubber').waitFor({ timeout: 20_000 });
+    await eventually('the moment is shown', async () => /00:20|20\.0/.test(await text(id('replay-time'))), 10_000);
+    assert.equal(await page.getByTestId(/^cmd-/).count(), 0, 'no command in a replay');
+    // The review has what the API has.
+    await open('anchors');
+    await press('review');
+    await id('draft').locator('tbody tr').first().waitFor({ timeout: 60_000 });
+    const { anchors } = await get(`/api/v1/calibrations/${(await get('/api/v1/calibrations')).items[0].id}`);
+    for (const { network_id } of anchors) assert.ok(await id('draft').getByText(network_id).count(), network_id);
+    await picture(page, `sizes-review-${size}`);
+    await page.keyboard.press('Escape');
+    // F9: a plan is named, and what was typed is there after another view.
+    await open('plan');
+    await id('plan-name').fill(`Hall on a ${size}`);
+    await open('system');
+    await open('plan');
+    assert.equal(await id('plan-name').inputValue(), `Hall on a ${size}`);
+    await page.getByRole('button', { name: 'Discard them' }).click();
+    assert.deepEqual(seen.errors, []);
+    await page.close();
+  });
+
+test('in forced colours nothing is lost: states have shape and word, buttons an edge', async () => {
+  const { page, id } = await openPage(browser, server);
+  await page.emulateMedia({ forcedColors: 'active' });
+  await id('live').waitFor({ timeout: 20_000 });
+  for (const tile of ['status-link', 'status-rtk', 'status-uwb']) assert.match(await text(id(tile)), /[A-Z0-9]{2,}/, tile);
+  const bare = await page.evaluate(() =>
+    [...document.querySelectorAll('button.btn, button.cmd, select, input')]
+      .filter((b) => b.checkVisibility())
+      .filter((b) => ['none', 'hidden'].includes(getComputedStyle(b).borderTopStyle))
+      .map((b) => b.textContent || b.name),
+  );
+  assert.deepEqual(bare, []);
+  await picture(page, 'forced-colours');
+  await page.close();
+});
