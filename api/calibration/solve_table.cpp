@@ -28,6 +28,12 @@ std::size_t total(const std::map<std::string, std::size_t>& refused) {
                          [](std::size_t sum, const auto& one) { return sum + one.second; });
 }
 
+/// A good place that a gate holds back is not one to read as ok.
+std::string verdict_word(const Estimate& e) {
+  if (e.verdict == Verdict::ok && !e.acceptable()) return "not acceptable";
+  return std::string(k_verdict_words.word(e.verdict));
+}
+
 /// Quoted where a comma or quote is inside.
 std::string field(std::string_view text) {
   if (text.find_first_of(",\"\n") == std::string_view::npos) return std::string(text);
@@ -68,8 +74,8 @@ std::string solve_table(std::span<const SolvedFlight> flights) {
       } else {
         append(out, "%15s %15s %10s %8s %8s", "-", "-", "-", "-", "-");
       }
-      append(out, " %-14s %7.2f %8zu %8zu\n", std::string(k_verdict_words.word(e.verdict)).c_str(),
-             e.gdop.value_or(0.0), e.n_used, total(e.refused));
+      append(out, " %-14s %7.2f %8zu %8zu\n", verdict_word(e).c_str(), e.gdop.value_or(0.0), e.n_used,
+             total(e.refused));
       if (e.mirror) {
         append(out, "%-10s ", "  or");
         append_place(out, *e.mirror, globe);
