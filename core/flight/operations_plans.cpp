@@ -73,6 +73,7 @@ Result<void> Operations::accept_anchor(const Now& now, const MissionId& mission,
     return make_error(Errc::invalid_argument,
                       undo ? to_string(anchor) + " was not accepted by hand"
                            : "no range of " + to_string(anchor) + " has come in this flight");
+  ++f.changes.n_accepted;
   take_events(f);
   show_soon_ = true;
   return boost::outcome_v2::success();

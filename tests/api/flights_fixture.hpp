@@ -165,6 +165,21 @@ class Flights : public AppFixture {
       app_->fly();
     }
   }
+  /// Flies on with five ranges a second of one anchor at (10, 5, 2) m.
+  void measure(double seconds) {
+    for (int i = 0; i < static_cast<int>(seconds * 5); ++i) {
+      fly(0.2);
+      const Eigen::Vector3d at = drone_->autopilot.vehicle().position_m();
+      const auto t_us = k_unix_us + std::llround(drone_->now * 1e6);
+      const Json row{{"t_us", t_us},
+                     {"tag", "0x6e01"},
+                     {"anchor", "0x6a21"},
+                     {"distance_m", (at - Eigen::Vector3d(10, 5, 2)).norm()}};
+      ASSERT_EQ(
+          post("/api/v1/ranges", row.dump() + "\n", "application/x-ndjson", {{"mission", mission_}}).status,
+          200);
+    }
+  }
   template <class Done>
   bool fly_until(Done done, double seconds) {
     for (const double end = drone_->now + seconds; drone_->now < end;) {

@@ -110,20 +110,6 @@ class LandedFlights : public Flights {
     calibrates_ = true;
     Flights::SetUp();
   }
-  void measure(double seconds) {
-    for (int i = 0; i < static_cast<int>(seconds * 5); ++i) {
-      fly(0.2);
-      const Eigen::Vector3d at = drone_->autopilot.vehicle().position_m();
-      const auto t_us = k_unix_us + std::llround(drone_->now * 1e6);
-      const Json row{{"t_us", t_us},
-                     {"tag", "0x6e01"},
-                     {"anchor", "0x6a21"},
-                     {"distance_m", (at - Eigen::Vector3d(10, 5, 2)).norm()}};
-      ASSERT_EQ(
-          post("/api/v1/ranges", row.dump() + "\n", "application/x-ndjson", {{"mission", mission_}}).status,
-          200);
-    }
-  }
   Json calibrations() { return json(get("/api/v1/calibrations"))["items"]; }
   bool event(const std::string& code) {
     const auto events = json(get(base() + "/events"))["items"];
