@@ -124,7 +124,7 @@ bool FlightService::State::to_keep(Work& w, std::string& text) {
   const auto& f = w.operations.flight();
   if (!f) return false;
   const auto n = f->control.engine().state().n_transitions + (f->aborted.empty() ? 0 : k_aborted) +
-                 k_change * (f->changes.n + f->changes.saved_revision + f->changes.n_accepted);
+                 k_change * (f->changes.n + f->changes.saved_revision + f->changes.n_anchor_orders);
   if (n == w.last.kept) return false;
   w.last.kept = n;
   text.clear();

@@ -1,4 +1,4 @@
-// Plans changed and anchors accepted in flight, as they are asked for.
+// Plans changed, and the work on anchors ended, in flight, as it is asked for.
 #include <algorithm>
 #include <utility>
 
@@ -101,22 +101,22 @@ Result<FlightService::PlanDifference> FlightService::take_plan(const MissionId& 
   return cannot("the flight moves on faster than the change can be checked: hold, then take it");
 }
 
-Result<void> FlightService::accept_anchor(const MissionId& mission, NetworkId anchor, bool undo,
-                                          const std::string& lease, const Principal& who) {
+Result<void> FlightService::order_anchor(const MissionId& mission, NetworkId anchor,
+                                         procedure::AnchorOrder order, const std::string& lease,
+                                         const Principal& who) {
   BOOST_OUTCOME_TRYV(renew_control(mission, lease, who));
   // Estimates are read before the lock is taken: their strand asks for it.
-  if (!undo) {
+  if (order == procedure::AnchorOrder::accept) {
     for (const auto& view : state_->deps.missions.live(mission)) {
       const auto e = std::ranges::find(view.estimates, anchor, &Estimate::anchor);
       if (e == view.estimates.end() || !e->best) return cannot(to_string(anchor) + " has no position yet");
-      if (e->verdict == Verdict::ambiguous)
-        return cannot(
-            to_string(anchor) +
-            " is ambiguous: it may as well be at its mirror solution, fly another side of it first");
+      if (e->verdict != Verdict::ok)
+        return cannot(to_string(anchor) + " is " + std::string(k_verdict_words.word(e->verdict)) +
+                      ", its position may be far off: fly where it is seen from another side, or give it up");
     }
   }
   auto w = state_->work.lock();
-  BOOST_OUTCOME_TRYV(w->operations.accept_anchor(state_->now(), mission, anchor, undo, who.name));
+  BOOST_OUTCOME_TRYV(w->operations.order_anchor(state_->now(), mission, anchor, order, who.name));
   state_->publish_events(*w);
   return boost::outcome_v2::success();
 }

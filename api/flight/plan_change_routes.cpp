@@ -1,5 +1,5 @@
-// A plan changed in flight: what is flown, what a change would do, and the change itself; and anchors
-// accepted by hand.
+// A plan changed in flight: what is flown, what a change would do, and the change itself; and the work on an
+// anchor, ended by hand.
 #include <nlohmann/json.hpp>
 
 #include "api/flight/plan_change_json.hpp"
@@ -59,7 +59,7 @@ Response take(FlightApi& s, const Request& request) {
 }
 
 /// Whatever it answers is in the audit log.
-Response accept_anchor(FlightApi& s, const Request& request) {
+Response order_anchor(FlightApi& s, const Request& request) {
   const auto mission = named_mission(s.missions, request).id;
   const auto anchor = parse_network_id(request.params.at("anchor"));
   if (!anchor)
@@ -69,12 +69,12 @@ Response accept_anchor(FlightApi& s, const Request& request) {
   const auto body = json_body(request);
   Fields fields(body, "", errors);
   const auto lease = fields.text("lease", 64).value_or("");
-  const bool undo = fields.boolean("undo").value_or(false);
+  const auto order = fields.word("action", procedure::k_anchor_order_words, true);
   fields.finish();
   refuse_if_any(errors);
-  const std::string audited = std::string("anchor.") + (undo ? "reopen " : "accept ") +
+  const std::string audited = "anchor." + std::string(procedure::k_anchor_order_words.word(*order)) + ' ' +
                               to_string(anchor.value()) + " of " + to_string(mission);
-  const auto done = s.flights.accept_anchor(mission, anchor.value(), undo, lease, request.principal);
+  const auto done = s.flights.order_anchor(mission, anchor.value(), *order, lease, request.principal);
   s.audit.soon(request, audited, done ? "ok" : "refused: " + done.error().message);
   if (!done && done.error().code == Errc::conflict) throw_problem(409, "no-control", done.error().message);
   if (!done && done.error().code == Errc::invalid_argument) throw_problem(422, "state", done.error().message);
@@ -94,8 +94,8 @@ void add_plan_change_routes(Router& router, FlightApi& s) {
   const std::string base = "/api/v1/missions/{id}/plan";
   router.add({Method::get, base, readers(), on(flown_plan)});
   router.add(as_heavy({Method::get, base + "/change", readers(), on(difference)}));
-  router.add(keeps_always({Method::post, "/api/v1/missions/{id}/anchors/{anchor}/accept", op,
-                           on(accept_anchor), k_command_bytes}));
+  router.add(keeps_always({Method::post, "/api/v1/missions/{id}/anchors/{anchor}/work", op,
+                           on(order_anchor), k_command_bytes}));
   router.add(keeps_always(as_flight({Method::post, base, op, on(take), k_command_bytes})));
 }
 

@@ -37,7 +37,8 @@ Ordered anchors_json(const procedure::FlightEngine& engine) {
     out.push_back({{"network_id", to_string(a.id)},
                    {"done", a.done},
                    {"reached", a.reached},
-                   {"accepted_by", a.accepted_by.empty() ? Ordered(nullptr) : Ordered(a.accepted_by)},
+                   {"ended_by", a.ended_by.empty() ? Ordered(nullptr) : Ordered(a.ended_by)},
+                   {"accepted", a.accepted},
                    {"why", a.why},
                    {"iterations", a.iterations},
                    {"waiting", a.waiting},
@@ -229,7 +230,8 @@ Ordered stored_state(const procedure::State& s) {
                        {"waiting", a.waiting},
                        {"done", a.done},
                        {"reached", a.reached},
-                       {"accepted_by", a.accepted_by},
+                       {"ended_by", a.ended_by},
+                       {"accepted", a.accepted},
                        {"why", a.why}});
   }
   return {{"step", procedure::to_string(s.step)},
@@ -287,7 +289,8 @@ std::optional<procedure::State> state_of(const nlohmann::json& j) {
       a.at("waiting").get_to(task.waiting);
       a.at("done").get_to(task.done);
       task.reached = a.value("reached", false);
-      task.accepted_by = a.value("accepted_by", "");
+      task.ended_by = a.value("ended_by", "");
+      task.accepted = a.value("accepted", false);
       a.at("why").get_to(task.why);
       s.anchors.push_back(std::move(task));
     }

@@ -60,7 +60,7 @@ struct FlownChanges {
   std::optional<DroneFence> autopilot_keeps;  ///< given on the ground, not to be changed in the air
   bool own_origin{true};                      ///< the stored plan has one; else the take-off gave it
   std::uint64_t saved_revision{0};            ///< newest that is stored of the plan; 0: none since the start
-  std::uint64_t n_accepted{0};                ///< anchors accepted by hand, or taken back, since the start
+  std::uint64_t n_anchor_orders{0};           ///< anchors accepted, given up or reopened by hand since the start
 };
 
 /// One flight, in the air or just landed.
@@ -176,10 +176,10 @@ class Operations {
   /// errors  invalid_argument: refused, with every reason
   Result<bool> take_plan(const Now& now, const MissionId& mission, const ChangeBasis& basis,
                          const PlanProposal& proposal, const std::string& who);
-  /// FlightEngine::accept(), in flight.
-  /// errors  invalid_argument: not flown, or of that anchor nothing came, or it was not accepted
-  Result<void> accept_anchor(const Now& now, const MissionId& mission, NetworkId anchor, bool undo,
-                             const std::string& who);
+  /// FlightEngine::end_work(), in flight.
+  /// errors  invalid_argument: not flown, or of that anchor nothing came, or there is nothing to take back
+  Result<void> order_anchor(const Now& now, const MissionId& mission, NetworkId anchor,
+                            procedure::AnchorOrder order, const std::string& who);
   /// A revision was stored that is not flown, should a flight fly this plan.
   void plan_saved(const PlanId& plan, const std::string& name, std::uint64_t revision);
   Result<FlightCommand> upload(const Now& now, const MissionId& mission, const Plan& plan,

@@ -1,5 +1,5 @@
-// What a person changes in flight: the plan (who asks, what it stands on, from when it is flown), and anchors
-// that are accepted.
+// What a person changes in flight: the plan (who asks, what it stands on, from when it is flown), and the work
+// on an anchor.
 #include <utility>
 
 #include "core/flight/operations.hpp"
@@ -61,19 +61,20 @@ Result<bool> Operations::take_plan(const Now& now, const MissionId& mission, con
   return true;
 }
 
-Result<void> Operations::accept_anchor(const Now& now, const MissionId& mission, NetworkId anchor, bool undo,
-                                       const std::string& who) {
+Result<void> Operations::order_anchor(const Now& now, const MissionId& mission, NetworkId anchor,
+                                      procedure::AnchorOrder order, const std::string& who) {
   const auto* flown = flight_of(mission);
   if (flown == nullptr || !flown->flying())
     return make_error(
         Errc::invalid_argument,
         "this mission is not being flown: anchors of a finished flight are accepted in its review");
   auto& f = *flight_;
-  if (!f.control.engine().accept(now.s, anchor, undo ? std::string{} : who))
+  if (!f.control.engine().end_work(now.s, anchor, order, who))
     return make_error(Errc::invalid_argument,
-                      undo ? to_string(anchor) + " was not accepted by hand"
-                           : "no range of " + to_string(anchor) + " has come in this flight");
-  ++f.changes.n_accepted;
+                      order == procedure::AnchorOrder::reopen
+                          ? "nobody has ended the work on " + to_string(anchor)
+                          : "no range of " + to_string(anchor) + " has come in this flight");
+  ++f.changes.n_anchor_orders;
   take_events(f);
   show_soon_ = true;
   return boost::outcome_v2::success();

@@ -12,7 +12,7 @@ std::string FlightEngine::outcome(const std::string& which) const {
   std::string without;
   std::size_t n = 0;
   for (const auto& task : state_.anchors) {
-    if (!task.done || task.reached || !task.accepted_by.empty()) continue;
+    if (!task.done || task.reached || task.accepted) continue;
     ++n;
     without += (without.empty() ? "" : ", ") + to_string(task.id);
   }
@@ -142,15 +142,28 @@ bool FlightEngine::next_is_current() const {
   return step == Step::go_to_waypoint || step == Step::take_off;
 }
 
-bool FlightEngine::accept(double now_s, NetworkId anchor, const std::string& who) {
+bool FlightEngine::end_work(double now_s, NetworkId anchor, AnchorOrder order, const std::string& who) {
   const auto task = std::ranges::find(state_.anchors, anchor, &AnchorTask::id);
-  if (task == state_.anchors.end() || (who.empty() && task->accepted_by.empty())) return false;
-  task->done = !who.empty();
+  if (task == state_.anchors.end()) return false;
+  const auto tell = [&](std::string_view code, const std::string& why) {
+    task->why = why;
+    report(now_s, EventLevel::info, std::string(code), to_string(anchor) + ": " + why);
+  };
+  if (order == AnchorOrder::reopen) {
+    if (task->ended_by.empty()) return false;
+    task->done = task->reached = task->accepted = false;
+    task->ended_by.clear();
+    tell("anchor.reopened", "assessed again at the next point, ordered by " + who);
+    return true;
+  }
+  task->done = true;
   task->reached = false;
-  task->why = who.empty() ? "assessed again at the next point" : "accepted by " + who;
-  task->accepted_by = who;
-  report(now_s, EventLevel::info, who.empty() ? "anchor.reopened" : "anchor.accepted",
-         to_string(anchor) + ": " + task->why);
+  task->accepted = order == AnchorOrder::accept;
+  task->ended_by = who;
+  if (task->accepted)
+    tell("anchor.accepted", "accepted by " + who);
+  else
+    tell("anchor.given_up", "given up by " + who);
   return true;
 }
 
@@ -165,7 +178,7 @@ void FlightEngine::change_plan(double now_s, FlightSetup setup, std::size_t wayp
   asked_.reset();
   answer_.reset();
   for (auto& task : state_.anchors) {
-    if (!task.done || !other_aim || !task.accepted_by.empty()) continue;
+    if (!task.done || !other_aim || !task.ended_by.empty()) continue;
     task.done = task.reached = false;
     task.why = "assessed again at the next point: the plan was changed";
   }

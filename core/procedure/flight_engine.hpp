@@ -124,9 +124,9 @@ class FlightEngine {
   /// while next_is_current(): the leg is laid out anew, a decision that is due is made anew, and with other
   /// targets every anchor is assessed anew. Whether it may: core/flight/plan_change.
   void change_plan(double now_s, FlightSetup setup, std::size_t waypoint, const std::string& why);
-  /// `who` ends the work on an anchor with the accuracy it has; empty: takes that back. False: no range of it
-  /// came, or there is nothing to take back.
-  bool accept(double now_s, NetworkId anchor, const std::string& who);
+  /// `who` ends the work on an anchor, or takes that back. False: no range of it came, or there is nothing to
+  /// take back.
+  bool end_work(double now_s, NetworkId anchor, AnchorOrder order, const std::string& who);
   /// The present waypoint is still to be flown to: on the way, or after a hold on it.
   bool next_is_current() const;
 

@@ -174,6 +174,15 @@ struct Settings {
   Result<void> check() const;
 };
 
+/// What a person may order of one anchor in flight.
+enum class AnchorOrder : std::uint8_t {
+  accept,   ///< its position is good enough: nothing more is flown for it
+  give_up,  ///< it is not, and nothing more is flown for it
+  reopen,   ///< takes either back
+};
+inline constexpr auto k_anchor_order_words = enum_table<AnchorOrder>(
+    {{"accept", AnchorOrder::accept}, {"give_up", AnchorOrder::give_up}, {"reopen", AnchorOrder::reopen}});
+
 /// One anchor's own sub-procedure; all run at once and share the aircraft.
 struct AnchorTask {
   NetworkId id{};
@@ -183,9 +192,10 @@ struct AnchorTask {
   int waiting{};        ///< points since it was ranged last: the planner serves who waits longest first
   int samples_here{};
   bool done{false};
-  bool reached{false};      ///< its accuracy; done without it: a limit ended it
-  std::string why;          ///< why it is done, or why not yet
-  std::string accepted_by;  ///< the person who ended the work on it, with the accuracy it had
+  bool reached{false};   ///< its accuracy; done without it: a limit or a person ended it
+  std::string why;       ///< why it is done, or why not yet
+  std::string ended_by;  ///< the person who ended the work on it; empty: nobody did
+  bool accepted{false};  ///< by that person, with the accuracy it had; else given up
   bool operator==(const AnchorTask&) const = default;
 };
 

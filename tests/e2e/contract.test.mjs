@@ -443,7 +443,7 @@ test('a flight by hand: control, checklist, start, hold, abort', async () => {
   await call('POST', `${path}/actions`, { expect: 202, json: { action: 'abort', lease } });
   await call('POST', `${path}/actions`, { expect: 202, json: { action: 'hold', lease } }); // always, whatever the server believes
   await call('POST', `${path}/actions`, { expect: 422, json: { action: 'return', lease } });
-  await call('POST', `${path}/anchors/0x6a21/accept`, { expect: 422, json: { lease } });
+  await call('POST', `${path}/anchors/0x6a21/work`, { expect: 422, json: { lease, action: 'give_up' } });
   await call('POST', `${path}/control`, { expect: 200, json: { action: 'release', lease } });
 });
 

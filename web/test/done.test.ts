@@ -36,7 +36,7 @@ describe('an anchor is done', () => {
     expect(as_shown(anchor('0x1', 'ambiguous'), flight([task('0x1', true, false)])).status).toBe('ambiguous');
   });
   it('when a person accepted it in flight, unless it is ambiguous; and reads so, not given up', () => {
-    const p = flight([{ ...task('0x1', true, false, 'accepted by A. Pilot'), accepted_by: 'A. Pilot' }]);
+    const p = flight([{ ...task('0x1', true, false, 'accepted by A. Pilot'), ended_by: 'A. Pilot', accepted: true }]);
     expect(as_shown(anchor('0x1', 'estimating'), p).status).toBe('accepted');
     expect(as_shown(anchor('0x1', 'ambiguous'), p).status).toBe('ambiguous');
     const s = new Scene('m');

@@ -37,11 +37,12 @@ export const command = (
     headers: { 'Idempotency-Key': idempotency_key() },
   });
 
-/// Ends the work on an anchor with the accuracy that it has, or takes that back.
-export const accept_anchor = (mission: string, anchor: string, lease: string, undo: boolean): Promise<unknown> =>
-  call('post', '/missions/{id}/anchors/{anchor}/accept', {
+export type AnchorOrder = 'accept' | 'give_up' | 'reopen';
+/// Ends the work on an anchor, or takes that back.
+export const order_anchor = (mission: string, anchor: string, lease: string, action: AnchorOrder): Promise<unknown> =>
+  call('post', '/missions/{id}/anchors/{anchor}/work', {
     path: { id: mission, anchor },
-    body: { lease, undo },
+    body: { lease, action },
     headers: { 'Idempotency-Key': idempotency_key() },
   });
 

@@ -41,8 +41,9 @@ export interface CommandMsg {
 export interface AnchorTask {
   readonly anchor: string;
   readonly done: boolean;
-  readonly reached: boolean; // its accuracy; done without it: given up, or accepted by hand
-  readonly accepted_by: string; // empty: nobody did
+  readonly reached: boolean; // its accuracy; done without it: given up, or accepted by a person
+  readonly ended_by: string; // the person who accepted it or gave it up; empty: nobody did
+  readonly accepted: boolean;
   readonly why: string;
   readonly iterations: number;
   readonly at_edge: boolean;
@@ -223,7 +224,8 @@ export function procedure(v: unknown): ProcedureMsg | null {
       anchor: str(a.network_id),
       done: a.done === true,
       reached: a.reached === true,
-      accepted_by: str(a.accepted_by),
+      ended_by: str(a.ended_by),
+      accepted: a.accepted === true,
       why: str(a.why),
       iterations: count(a.iterations),
       at_edge: a.height_at_edge === true,

@@ -5,7 +5,8 @@ import type { EstimateMsg, MissionMsg } from '../live/messages';
 import type { Scene } from './scene';
 
 export const over = (p: ProcedureMsg | null | undefined): boolean => p?.status === 'done' || p?.status === 'aborted';
-const task_of = (p: ProcedureMsg | null | undefined, anchor: string): AnchorTask | undefined =>
+/// What the procedure does about an anchor.
+export const task_of = (p: ProcedureMsg | null | undefined, anchor: string): AnchorTask | undefined =>
   p?.anchors.find((t) => t.anchor === anchor);
 
 /// The likelier of two solutions is the anchor; the other is drawn as its mirror. Reflected in the line between them, like its covariance.
@@ -44,11 +45,11 @@ export function likelier(e: EstimateMsg): EstimateMsg {
 }
 
 /// The estimate with the status that is shown. While the aircraft still works on an anchor it is not done, and what ran out of time, points or
-/// battery, or was left by the end of the flight, was given up: neither is ever green. What a person accepted in flight reads so.
+/// battery, by a person, or by the end of the flight was given up: neither is ever green. What a person accepted in flight reads so.
 export function as_shown(given: EstimateMsg, p: ProcedureMsg | null | undefined): EstimateMsg {
   const e = likelier(given);
   const task = task_of(p, e.anchor);
-  if (task?.accepted_by && e.status !== 'ambiguous' && e.status !== 'moved') return { ...e, status: 'accepted' };
+  if (task?.accepted && e.status !== 'ambiguous' && e.status !== 'moved') return { ...e, status: 'accepted' };
   if (!task || task.reached || e.status === 'accepted' || e.status === 'moved' || e.status === 'ambiguous') return e;
   if (task.done || over(p)) return { ...e, status: 'gave_up' };
   return e.status === 'converged' ? { ...e, status: 'estimating' } : e;
@@ -82,12 +83,6 @@ export function done_count(scene: Scene | null, m: MissionMsg | null): DoneCount
     total: Math.max(ids.size, m?.anchors_found ?? 0),
   };
 }
-/// Who accepted an anchor by hand in this flight; empty: nobody did.
-export const accepted_by = (p: ProcedureMsg | null | undefined, anchor: string): string =>
-  task_of(p, anchor)?.accepted_by ?? '';
-/// Whether the procedure still works on an anchor.
-export const works_on = (p: ProcedureMsg | null | undefined, anchor: string): boolean =>
-  task_of(p, anchor)?.done === false && !over(p);
 /// Why the procedure has not finished an anchor, in its own words; empty where it has, or does not know it.
 export function task_reason(p: ProcedureMsg | null | undefined, anchor: string): string {
   const t = task_of(p, anchor);

@@ -108,7 +108,7 @@ export class Scene {
   /// Which anchors are done or given up is part of the slow picture.
   add_procedure(p: ProcedureMsg, at_ms: number): void {
     const tasks = (x: ProcedureMsg | undefined): string =>
-      x ? `${x.status} ${x.anchors.map((a) => `${a.anchor}${a.done}${a.reached}${a.accepted_by}`).join()}` : '';
+      x ? `${x.status} ${x.anchors.map((a) => `${a.anchor}${a.done}${a.reached}${a.accepted}`).join()}` : '';
     if (tasks(p) !== tasks(this.procedure?.value)) this.estimates_version++;
     this.procedure = { value: p, at_ms };
     this.version++;

@@ -83,8 +83,8 @@ export class Conditions {
       s.slow,
       2000,
       'advisory',
-      'This link is slow',
-      'The page is sent less often what it shows, never older. Go nearer to the access point, or close other pages.',
+      'This page cannot keep up',
+      'It is sent less often what it shows, never older. Go nearer to the access point, or close other pages and programs.',
     );
     const range_silence_ms = Math.min(s.range_silence_ms, s.now_ms - this.data_from_ms);
     const ranging = s.recording && s.range_silence_ms < 60_000;

@@ -1,14 +1,14 @@
 /// The selected anchor beside the map: state, why it is not done, its curve, its ellipse at true scale, its covariance.
 import type { EstimateMsg } from '../live/messages';
 import { sigma_h, sigma_v } from '../map/enu';
-import { accepted_by, shown_estimate, task_reason, works_on } from '../state/done';
+import { shown_estimate, task_of, task_reason } from '../state/done';
 import { replayed, watched_mission, watched_scene, now_ms, tick, watched_lost } from '../state/store';
 import { accuracy, age, fixed, metres, percent } from '../ui/format';
 import { Chip, Q, StatusChip } from '../ui/marks';
 import { why_not_done } from '../ui/words';
 import { Convergence } from './convergence';
 import { HoldButton } from './flight/hold_button';
-import { accept, lease } from './flight/lease';
+import { lease, order } from './flight/lease';
 import { flying } from './flight/words';
 import { Covariance, Loupe } from './loupe';
 
@@ -48,7 +48,7 @@ export function AnchorCard({ anchor }: { anchor: string }) {
         </div>
       )}
       {e.enu_m && <Figures e={e} stale={stale} />}
-      {!replayed.value && <AcceptInFlight e={e} />}
+      {!replayed.value && <WorkInFlight e={e} />}
       <div class="pair detail">
         <Convergence anchor={anchor} />
         {e.ellipse95 && <Loupe e={e} />}
@@ -58,33 +58,36 @@ export function AnchorCard({ anchor }: { anchor: string }) {
   );
 }
 
-/// A person may be content with an anchor before the procedure is: nothing more is flown for it. Whoever has control, and never of an ambiguous one.
-function AcceptInFlight({ e }: { e: EstimateMsg }) {
+/// A person may be content with an anchor before the procedure is, or give it up: nothing more is flown for it. Only a position that is determined
+/// can be accepted.
+function WorkInFlight({ e }: { e: EstimateMsg }) {
   const p = watched_scene()?.procedure?.value,
-    by = accepted_by(p, e.anchor),
+    task = task_of(p, e.anchor),
     off = watched_lost() || lease.value?.mission !== e.mission;
-  if (!p || !flying(p) || (off && !by)) return null;
-  if (by)
+  if (!p || !task || !flying(p)) return null;
+  if (task.ended_by)
     return (
-      <p class="why" data-testid="accepted-by">
-        Accepted by {by}: nothing more is flown for it.{' '}
+      <p class="why" data-testid="work-ended">
+        {task.accepted ? 'Accepted' : 'Given up'} by {task.ended_by}: nothing more is flown for it.{' '}
         {!off && (
-          <button class="btn small" onClick={() => void accept(e.mission, e.anchor, true)}>
+          <button class="btn small" onClick={() => void order(e.mission, e.anchor, 'reopen')}>
             Work on it again
           </button>
         )}
       </p>
     );
-  if (!works_on(p, e.anchor) || !e.enu_m || e.status === 'ambiguous') return null;
+  if (task.done || off) return null;
+  const accepts = e.verdict === 'ok' && e.enu_m !== null;
   return (
     <p class="accept">
       <HoldButton
-        testid="accept-anchor"
+        key={`${e.anchor} ${accepts}`} // what comes under the finger meanwhile is not done
+        testid={accepts ? 'accept-anchor' : 'give-up-anchor'}
         disabled={false}
         note="hold 1 s"
-        onConfirm={() => void accept(e.mission, e.anchor, false)}
+        onConfirm={() => void order(e.mission, e.anchor, accepts ? 'accept' : 'give_up')}
       >
-        Accept {e.anchor} as it is
+        {accepts ? `Accept ${e.anchor} as it is` : `Give up ${e.anchor}`}
       </HoldButton>
     </p>
   );

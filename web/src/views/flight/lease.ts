@@ -2,7 +2,8 @@
 import { effect, signal } from '@preact/signals';
 import { ApiError, error_text } from '../../api/client';
 import {
-  accept_anchor,
+  order_anchor,
+  type AnchorOrder,
   ask_for_control,
   command,
   refuse_control,
@@ -66,10 +67,15 @@ export async function send(mission: string, action: Action, more: Parameters<typ
   await guarded(() => command(mission, action, lease.value!.key, more));
 }
 
-export const accept = (mission: string, anchor: string, undo: boolean): Promise<boolean> =>
+const ORDER_WORDS: Record<AnchorOrder, string> = {
+  accept: 'accepted',
+  give_up: 'given up',
+  reopen: 'is worked on again',
+};
+export const order = (mission: string, anchor: string, action: AnchorOrder): Promise<boolean> =>
   guarded(async () => {
-    await accept_anchor(mission, anchor, lease.value?.key ?? '', undo);
-    say(undo ? `${anchor} is worked on again` : `${anchor} accepted`);
+    await order_anchor(mission, anchor, lease.value?.key ?? '', action);
+    say(`${anchor} ${ORDER_WORDS[action]}`);
   });
 
 let renewed_ms = 0,

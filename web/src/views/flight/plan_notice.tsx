@@ -28,7 +28,7 @@ export function PlanNotice({ p }: { p: ProcedureMsg }) {
         </p>
       )}
       {p.plan_undo_revision !== null && may('operator') && open !== 'undo' && (
-        <p class="why">
+        <p class="callout">
           The plan was changed in flight.{' '}
           <button class="btn small" data-testid="plan-undo" onClick={() => (shown_change.value = 'undo')}>
             Undo: back to revision {p.plan_undo_revision}
