@@ -50,7 +50,14 @@ for (const [size, width, height] of sizes)
     await id('plan-name').fill(`Hall on a ${size}`);
     await open('system');
     await open('plan');
-    assert.equal(await id('plan-name').inputValue(), `Hall on a ${size}`);
+    await eventually('the name that was typed', async () => (await id('plan-name').inputValue()) === `Hall on a ${size}`);
+    if (height > width)
+      for (const view of ['live', 'anchors', 'plan']) {
+        await open(view);
+        const box = await id(view === 'plan' ? 'plan-map' : 'map').first().boundingBox();
+        assert.ok(box.height >= 0.4 * height, `map of ${box.height} px in ${view}`);
+      }
+    await open('plan');
     await page.getByRole('button', { name: 'Discard them' }).click();
     assert.deepEqual(seen.errors, []);
     await page.close();
