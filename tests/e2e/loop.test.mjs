@@ -79,7 +79,10 @@ async function compare(view, when) {
         wrong = [],
         same = (what, ok) => ok || wrong.push(`${what}: ${JSON.stringify(shown[what] ?? shown)}`);
       const between = (x, a, b, slack) => x >= Math.min(a, b) - slack && x <= Math.max(a, b) + slack;
-      same('waypoint', [first, then].some(({ p }) => Math.min(p.waypoint, p.n_waypoints) === shown.waypoint[0]));
+      same(
+        'waypoint',
+        [first, then].some(({ p }) => Math.min(p.waypoint, p.n_waypoints) === shown.waypoint[0]),
+      );
       same('waypoint', shown.waypoint[1] === then.p.n_waypoints || shown.waypoint[1] === first.p.n_waypoints);
       same('flown', between(seconds(shown.flown ?? '0'), first.p.elapsed_s, then.p.elapsed_s, 2.5));
       same('ranges', between(shown.ranges, first.m.n_ranges, then.m.n_ranges, 150));
@@ -119,7 +122,7 @@ test('drawn on the tablet with a finger, generated, saved, the visitor sees it',
         .waitFor({ timeout: 3000 })
         .then(
           () => true,
-          async () => (await id('nav-live').tap(), false),
+          () => id('nav-live').tap(),
         );
     },
     40_000,
@@ -210,8 +213,9 @@ test('an anchor is given up and taken back, one whose position is determined is 
   const { id } = phone,
     task = async (anchor) => (await procedure()).anchors.find((a) => a.network_id === anchor),
     choose = (anchor) => id('range-list').getByRole('button', { name: anchor }).tap();
-  const weak = (await get(`/api/v1/anchors?view=live&mission=${mission}`)).features.find((f) => f.properties.quality.verdict !== 'ok')
-    .properties.network_id;
+  const weak = (await get(`/api/v1/anchors?view=live&mission=${mission}`)).features.find(
+    (f) => f.properties.quality.verdict !== 'ok',
+  ).properties.network_id;
   await choose(weak); // or the next anchor that is heard takes its place
   await confirm(phone, 'give-up-anchor');
   await id('work-ended').getByText('Given up by').waitFor({ timeout: 5000 });
@@ -278,15 +282,16 @@ test('landed, solved by itself, reviewed and published on the phone: the API ser
   // So short a flight may leave none that passes: then one goes with a reason.
   if (!(await id('publish-now').isEnabled())) {
     await id('draft').getByRole('button', { name: 'Accept all the same' }).first().tap();
-    await id('draft')
-      .getByRole('textbox')
-      .first()
-      .fill('a test on the ground');
+    await id('draft').getByRole('textbox').first().fill('a test on the ground');
   }
   await id('publish-now').tap();
   await id('publish').waitFor({ state: 'detached', timeout: 20_000 });
   const { features, revision } = await get('/api/v1/anchors');
   assert.equal(revision, 1);
   assert.ok(features.length > 0);
-  for (const seen of [tablet, phone, visitor]) assert.deepEqual(seen.seen.errors.filter((e) => !/ERR_|WebSocket/.test(e)), []);
+  for (const seen of [tablet, phone, visitor])
+    assert.deepEqual(
+      seen.seen.errors.filter((e) => !/ERR_|WebSocket/.test(e)),
+      [],
+    );
 });

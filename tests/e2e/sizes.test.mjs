@@ -28,7 +28,12 @@ for (const [size, width, height] of sizes)
     // F11: the confusion is that of the API.
     await id('confusion').waitFor({ timeout: 20_000 });
     const c = (await get(`/api/v1/training-runs/${training.id}/confusion`)).test.confusion;
-    assert.deepEqual((await id('confusion').locator('tbody td b').allTextContents()).map(Number), [c.tp, c.fn, c.fp, c.tn]);
+    assert.deepEqual((await id('confusion').locator('tbody td b').allTextContents()).map(Number), [
+      c.tp,
+      c.fn,
+      c.fp,
+      c.tn,
+    ]);
     // F19: a measurement opens.
     await open('measurements');
     await eventually('rows are there', async () => (await id('rows').getByRole('row').count()) > 3, 20_000);
@@ -50,11 +55,16 @@ for (const [size, width, height] of sizes)
     await id('plan-name').fill(`Hall on a ${size}`);
     await open('system');
     await open('plan');
-    await eventually('the name that was typed', async () => (await id('plan-name').inputValue()) === `Hall on a ${size}`);
+    await eventually(
+      'the name that was typed',
+      async () => (await id('plan-name').inputValue()) === `Hall on a ${size}`,
+    );
     if (height > width)
       for (const view of ['live', 'anchors', 'plan']) {
         await open(view);
-        const box = await id(view === 'plan' ? 'plan-map' : 'map').first().boundingBox();
+        const box = await id(view === 'plan' ? 'plan-map' : 'map')
+          .first()
+          .boundingBox();
         assert.ok(box.height >= 0.4 * height, `map of ${box.height} px in ${view}`);
       }
     await open('plan');
@@ -67,7 +77,8 @@ test('in forced colours nothing is lost: states have shape and word, buttons an 
   const { page, id } = await openPage(browser, server);
   await page.emulateMedia({ forcedColors: 'active' });
   await id('live').waitFor({ timeout: 20_000 });
-  for (const tile of ['status-link', 'status-rtk', 'status-uwb']) assert.match(await text(id(tile)), /[A-Z0-9]{2,}/, tile);
+  for (const tile of ['status-link', 'status-rtk', 'status-uwb'])
+    assert.match(await text(id(tile)), /[A-Z0-9]{2,}/, tile);
   const bare = await page.evaluate(() =>
     [...document.querySelectorAll('button.btn, button.cmd, select, input')]
       .filter((b) => b.checkVisibility())

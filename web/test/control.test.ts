@@ -1,7 +1,7 @@
 import { describe, expect, it } from 'vitest';
 import { procedure } from '../src/live/flight_messages';
 import { event, type EventMsg } from '../src/live/messages';
-import { answer_of, command_note, loss_of, question_of } from '../src/views/flight/control';
+import { answer_of, asked_at_us, command_note, loss_of, question_of } from '../src/views/flight/control';
 
 const T = 1_777_889_472_000_000,
   s = (n: number): number => T + n * 1e6;
@@ -39,6 +39,11 @@ describe('control of this page', () => {
     expect(answer_of('m', s(10), control, [], s(12))).toBe('waiting');
     expect(answer_of('m', s(10), control, [said('control.refused', 9)], s(12))).toBe('waiting');
     expect(answer_of('m', s(10), control, [said('control.refused', 11)], s(12))).toBe('refused');
+    // Asked again at once, the server's time known 3 s late: what refused the first question is no answer to the second.
+    const before = [said('control.refused', 11), said('control.refused', 30, 'other')],
+      again_us = asked_at_us('m', before, s(8));
+    expect(answer_of('m', again_us, control, before, s(12))).toBe('waiting');
+    expect(answer_of('m', again_us, control, [...before, said('control.refused', 13)], s(14))).toBe('refused');
     expect(answer_of('m', s(10), null, [], s(12))).toBe('granted');
     expect(answer_of('m', s(10), { ...control!, expires_us: s(900) }, [], s(80))).toBe('expired');
   });

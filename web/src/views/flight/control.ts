@@ -24,6 +24,10 @@ export function question_of(lease: Held, events: readonly EventMsg[], now_us: nu
     mine.filter((e) => e.code === 'control.asked' && e.t_us > answered && now_us - e.t_us < ASKED_US).at(-1) ?? null
   );
 }
+/// When a question that is asked now was asked: after every refusal that this page has heard of. Over a slow link the server's time is known late, and the
+/// refusal of the question before would answer the new one.
+export const asked_at_us = (mission: string, events: readonly EventMsg[], now_us: number): number =>
+  events.reduce((at, e) => (e.code === 'control.refused' && e.mission === mission ? Math.max(at, e.t_us) : at), now_us);
 export type Answer = 'waiting' | 'granted' | 'refused' | 'expired';
 /// What became of our own question of `asked_us`: granted when nobody has control any more.
 export function answer_of(

@@ -13,7 +13,7 @@ import {
   type Action,
 } from '../../api/flight';
 import { events, link, now_ms, say, scenes, server_now_us, tick } from '../../state/store';
-import { answer_of, loss_of, type Held } from './control';
+import { answer_of, asked_at_us, loss_of, type Held } from './control';
 
 /// Ours, with the mission it is for. Lives as long as the page: two browsers of one person are two.
 export const lease = signal<Held | null>(null);
@@ -56,7 +56,7 @@ export const give_back = (mission: string): Promise<boolean> =>
 export const ask = (mission: string): Promise<boolean> =>
   guarded(async () => {
     await ask_for_control(mission);
-    asking.value = { mission, at_us: server_now_us() };
+    asking.value = { mission, at_us: asked_at_us(mission, events.peek(), server_now_us()) };
   });
 export const refuse = (mission: string): Promise<boolean> =>
   guarded(() => refuse_control(mission, lease.value?.key ?? ''));
