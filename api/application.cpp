@@ -12,6 +12,7 @@
 #include "api/admin/job_service.hpp"
 #include "api/admin/routes.hpp"
 #include "api/admin/running_time.hpp"
+#include "api/anchors/anchor_answers.hpp"
 #include "api/anchors/contradiction_watch.hpp"
 #include "api/anchors/geo_service.hpp"
 #include "api/anchors/published_features.hpp"
@@ -178,6 +179,7 @@ struct Application::State {
             housekeeping, running,         deps.keep_deleted_ns, deps.clock,   audit,      flights},
         measurement_api{stores.measurements, ingest, missions,     models, stores.exclusions, events,
                         deps.clock,          audit,  demonstration},
+        anchor_answers(stores.revisions, contradictions),
         anchor_api{stores.sites,
                    stores.anchors,
                    stores.calibrations,
@@ -256,6 +258,7 @@ struct Application::State {
                      audit} {
     missions.observe(&flights);
     mission_api.flight = flight_actions(flight_api);
+    anchor_api.answers = &anchor_answers;
     anchor_api.file = [this](std::string_view format, const Request& request) {
       return anchor_file(exchange_api, format, request);
     };
@@ -368,6 +371,7 @@ struct Application::State {
   DeviceApi device_api;
   MissionApi mission_api;
   MeasurementApi measurement_api;
+  AnchorAnswers anchor_answers;
   AnchorApi anchor_api;
   CalibrationApi calibration_api;
   PlanningApi planning_api;
@@ -535,6 +539,11 @@ void Application::State::sign_models_of_before() {
 Router& Application::router() { return state_->router; }
 Hub& Application::hub() { return state_->hub; }
 DeviceRows& Application::device_rows() { return state_->device_ingest; }
+
+std::optional<Response> Application::at_hand(const Route& route, const Request& request) const {
+  if (route.pattern != k_anchor_pattern) return std::nullopt;
+  return state_->anchor_answers.find(request);
+}
 
 WsHandlerFactory Application::ws_factory() {
   return [this](const Principal& who, std::function<bool()> holds) {

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <utility>
@@ -106,6 +107,8 @@ class Application {
   Application& operator=(const Application&) = delete;
 
   Router& router();
+  /// The answer to a GET where it is at hand, encoded: never waits for the disk. None: the router's to make.
+  std::optional<Response> at_hand(const Route& route, const Request& request) const;
   WsHandlerFactory ws_factory();
   /// At /omlox/v2/ws/socket, whose clients send their token in a message.
   TokenWsFactory omlox_ws_factory();

@@ -2,6 +2,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
+#include "api/anchors/anchor_answers.hpp"
 #include "api/anchors/anchor_json.hpp"
 #include "api/anchors/anchor_selection.hpp"
 #include "api/anchors/contradiction_watch.hpp"
@@ -112,13 +113,23 @@ Response answer(const AnchorFeature& feature) {
   return response;
 }
 
-/// To a GET: who names the ETag has the body already, which is not even made then; the router answers 304.
-Response answer_unless_known(const Request& request, const AnchorFeature& feature) {
+/// To a GET. Who names the ETag has the body already, which is not even made then; the router answers 304.
+Response one(AnchorApi& s, const Request& request) {
+  check_query(request, {});
+  if (s.answers != nullptr) {
+    if (auto kept = s.answers->find(request)) return *std::move(kept);
+  }
+  const auto before = s.answers != nullptr ? s.answers->state() : std::nullopt;
+  const AnchorFeature feature = feature_of(s, path_anchor(s, request));
   const std::string tag = etag(feature);
-  if (!etag_listed(request.header("if-none-match"), tag)) return answer(feature);
-  Response response;
-  response.header("Content-Type", "application/geo+json");
-  response.header("ETag", tag);
+  if (etag_listed(request.header("if-none-match"), tag)) {
+    Response response;
+    response.header("Content-Type", "application/geo+json");
+    response.header("ETag", tag);
+    return response;
+  }
+  Response response = answer(feature);
+  if (s.answers != nullptr) s.answers->keep(request.params.at("id"), before, {response.body, tag});
   return response;
 }
 
@@ -194,10 +205,7 @@ void add_anchor_routes(Router& router, AnchorApi& s) {
     return file || request.query_value("view") == "live" ? Work::heavy : Work::ordinary;
   };
   router.add(std::move(listed));
-  router.add({Method::get, "/api/v1/anchors/{id}", readers(), [&s](const Request& request) {
-                check_query(request, {});
-                return answer_unless_known(request, feature_of(s, path_anchor(s, request)));
-              }});
+  router.add({Method::get, std::string(k_anchor_pattern), readers(), on(one)});
   router.add({Method::patch, "/api/v1/anchors/{id}", Access::any_of({Role::integrator}), on(patch), 1 << 20,
               false, true});
   router.add(as_heavy({Method::get, "/api/v1/anchors/{id}/estimates", readers(), on(estimates)}));

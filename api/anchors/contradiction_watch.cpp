@@ -111,6 +111,12 @@ void ContradictionWatch::changed() {
   ++newest->change;
 }
 
+std::optional<std::uint64_t> ContradictionWatch::settled() const {
+  const auto newest = newest_.lock();
+  if (newest->compared != newest->change) return std::nullopt;
+  return newest->change;
+}
+
 std::shared_ptr<const ContradictionWatch::Standing> ContradictionWatch::standing() {
   const std::scoped_lock one(comparing_);
   std::uint64_t change = 0;

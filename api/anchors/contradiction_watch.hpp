@@ -4,6 +4,7 @@
 #include <memory>
 #include <mutex>
 #include <nlohmann/json_fwd.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -56,6 +57,8 @@ class ContradictionWatch {
   /// Up to date as far as the store can be read; reads it only after a change. What cannot be read leaves the
   /// last answer, and the next call tries again.
   std::shared_ptr<const Standing> standing();
+  /// The change that the last answer is of; none while a newer one waits for its reader.
+  std::optional<std::uint64_t> settled() const;
   /// The last answer, without reading: at most one alarm, which names them all.
   std::vector<AlarmCondition> alarms() const;
 

@@ -17,6 +17,7 @@ class SiteStore;
 
 namespace anchord::api {
 
+class AnchorAnswers;
 class ContradictionWatch;
 class GeoService;
 class MissionService;
@@ -37,6 +38,7 @@ struct AnchorApi {
   /// The published anchors that a request selects as a file of another program (`format` of GET /anchors);
   /// given by api/exchange.
   std::function<Response(std::string_view format, const Request&)> file{};
+  AnchorAnswers* answers{nullptr};  ///< where those of single anchors are kept; null: nowhere
 };
 
 void add_anchor_routes(Router& router, AnchorApi& api);

@@ -45,6 +45,9 @@ class RevisionStore {
   virtual Result<std::optional<PublishedPosition>> position(NetworkId network_id, std::uint64_t revision) = 0;
   /// Every position ever published of one anchor, newest first.
   virtual Result<std::vector<PublishedPosition>> history(NetworkId network_id) = 0;
+  /// Another number after every change of what is stored, measurements apart: what was read under a number
+  /// still holds under the same. None where that cannot be told (others write too).
+  virtual std::optional<std::uint64_t> changes() const { return std::nullopt; }
 };
 
 }  // namespace anchord

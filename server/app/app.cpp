@@ -376,6 +376,9 @@ void App::State::compose() {
   options.places = {config.count("ws.max_connections"), config.count("ws.per_token"),
                     config.count("ws.reserved")};
   options.proxies = proxies;
+  options.at_hand = [this](const api::Route& route, const api::Request& request) {
+    return application->at_hand(route, request);
+  };
   door = std::make_unique<Authenticator>(application->router(), application->ws_factory(),
                                          application->omlox_ws_factory(), *access, *metrics, options);
 }

@@ -308,6 +308,18 @@ Admission Authenticator::admit(api::Request& request, std::string_view host, boo
   return admission;
 }
 
+/// An answer that is at hand goes out where it was asked for, with all that the router adds to one.
+Admission Authenticator::at_once(Admission admission, const api::Route& route, api::Response& answer) {
+  admission.quick = true;
+  const auto held = std::make_shared<api::Response>(std::move(answer));
+  admission.run = [this, held, access = route.access](api::Request& r) {
+    const api::Route at_hand{
+        api::Method::get, {}, access, [&](const api::Request&) { return std::move(*held); }};
+    return router_.dispatch(at_hand, r);
+  };
+  return admission;
+}
+
 Admission Authenticator::decide(api::Request& request, std::string_view host, bool websocket) {
   request.remote = options_.proxies.client(request.remote, request.header("x-forwarded-for"));
   if (closed_) {
@@ -356,6 +368,9 @@ Admission Authenticator::decide(api::Request& request, std::string_view host, bo
   // /healthz says that the event loop turns, so it is answered by it; /version is a constant, and two changes
   // of thread would cost more than all the rest of its answer.
   admission.quick = request.path == "/healthz" || request.path == "/version";
+  if (route.method == api::Method::get && options_.at_hand) {
+    if (auto answer = options_.at_hand(route, request)) return at_once(std::move(admission), route, *answer);
+  }
   admission.run = [this, &route, login = std::move(login)](api::Request& r) { return run(route, r, login); };
   admission.work = [&route](const api::Request& r) { return route.work_for(r); };
   // With login off everybody is the same one.

@@ -24,6 +24,8 @@ struct AuthenticatorOptions {
   double rate_per_s{50}, rate_burst{200};
   TrustedProxies proxies{};
   WsPlaceLimits places{};
+  /// The answer to a permitted GET where it is at hand; asked on io threads, never waits.
+  std::function<std::optional<api::Response>(const api::Route&, const api::Request&)> at_hand{};
 };
 
 /// Between the transport and the application: who asks, from which page, how often, and which route answers.
@@ -49,6 +51,7 @@ class Authenticator final : public Gateway {
   /// Whether this login stands; holds its place among the live connections for as long as it is kept.
   std::function<bool()> standing(const api::Login& login, std::shared_ptr<void> place);
   std::function<bool()> let_in(const api::Request& request, std::string_view token);
+  Admission at_once(Admission admission, const api::Route& route, api::Response& answer);
   Admission decide(api::Request& request, std::string_view host, bool websocket);
   api::Response run(const api::Route& route, api::Request& request, const api::Login& login);
 

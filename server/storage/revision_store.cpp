@@ -32,6 +32,7 @@ class SqlRevisionStore final : public RevisionStore {
     return read_value<std::vector<PublishedPosition>>(
         gate_, [&](Connection& c) { return positions_of_anchor(c, network_id); });
   }
+  std::optional<std::uint64_t> changes() const override { return gate_.changes(); }
 
  private:
   Gate& gate_;

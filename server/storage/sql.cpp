@@ -61,7 +61,9 @@ Uuid Query::uuid() {
 }
 
 Result<void> write_void(Gate& gate, const Work& work, std::size_t rows) {
-  if (auto error = gate.write(rows, work)) return *std::move(error);
+  auto error = gate.write(rows, work);
+  gate.changed();
+  if (error) return *std::move(error);
   return boost::outcome_v2::success();
 }
 

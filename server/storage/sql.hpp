@@ -1,5 +1,6 @@
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <functional>
 #include <optional>
@@ -225,6 +226,17 @@ class Gate {
   virtual std::optional<Error> write(std::size_t rows, const Work& work) = 0;
   /// One consistent snapshot.
   virtual std::optional<Error> read(const Work& work) = 0;
+
+  /// Another number once anything but appended measurements was written; none where others write as well.
+  virtual std::optional<std::uint64_t> changes() const { return std::nullopt; }
+  /// After the commit, before whoever asked for it is answered.
+  void changed() { changes_.fetch_add(1, std::memory_order_acq_rel); }
+
+ protected:
+  std::uint64_t counted_changes() const { return changes_.load(std::memory_order_acquire); }
+
+ private:
+  std::atomic<std::uint64_t> changes_{0};
 };
 
 /// Runs `work` (Connection& -> Result<T>) through the gate.
@@ -237,6 +249,7 @@ Result<T> write_value(Gate& gate, std::size_t rows, F work) {
     value = std::move(result).value();
     return std::nullopt;
   });
+  gate.changed();
   if (error) return *std::move(error);
   return *std::move(value);
 }

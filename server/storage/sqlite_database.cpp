@@ -86,6 +86,7 @@ class SqliteDatabase final : public Database, private sql::Gate {
     return writer_.write(rows, work);
   }
   std::optional<Error> read(const sql::Work& work) override { return readers_.read(work); }
+  std::optional<std::uint64_t> changes() const override { return counted_changes(); }
 
   std::unique_ptr<SqliteConnection> open_connection(Mode mode) const {
     return std::make_unique<SqliteConnection>(folder_->database(), mode, options_.synchronous,
