@@ -106,6 +106,48 @@ TEST_F(Resources, AnAnchorsEtagChangesWithWhatItShowsOfItsSite) {
   EXPECT_EQ(json(read)["properties"]["crs"]["frame"], "ETRS89");
 }
 
+// What a socket answers by itself is what the store would say: kept only until anything is written that it may
+// show.
+TEST_F(Resources, AnAnchorThatWasReadIsAtHandUntilAnythingIsWritten) {
+  const std::string path = "/api/v1/anchors/0x6a2f";
+  const auto at_hand = [&](const Call& options = {}) {
+    const auto found = app_->router().resolve(Method::get, path);
+    api::Request request;
+    request.method = Method::get;
+    request.path = path;
+    request.params = found.params;
+    request.query = options.query;
+    request.headers = options.headers;
+    return app_->at_hand(*found.route, request);
+  };
+  EXPECT_FALSE(at_hand()) << "nothing is published";
+  post("/api/v1/calibrations/" + calibration() + "/publish", "");
+  EXPECT_FALSE(at_hand()) << "nobody has read it";
+  const auto read = get(path);
+  const auto kept = at_hand();
+  ASSERT_TRUE(kept);
+  EXPECT_EQ(kept->body, read.body);
+  EXPECT_EQ(header(*kept, "ETag"), header(read, "ETag"));
+  const auto known = at_hand(with("if-none-match", header(read, "ETag")));
+  ASSERT_TRUE(known);
+  EXPECT_EQ(known->body, "");
+  Call strange;
+  strange.query = {{"view", "live"}};
+  EXPECT_FALSE(at_hand(strange)) << "a query is the router's to judge";
+
+  const auto site = post("/api/v1/sites", R"({"name":"Ghent","origin":{"lon":3.7,"lat":51.0,"h_m":55}})");
+  EXPECT_FALSE(at_hand()) << "it may be its site";
+  const auto placed = call(Method::patch, path, to_wire(Json{{"site", json(site)["id"]}}),
+                           with("if-match", header(get(path), "ETag")));
+  ASSERT_EQ(placed.status, 200) << placed.body;
+  EXPECT_FALSE(at_hand());
+  EXPECT_EQ(json(get(path))["properties"]["site"], json(site)["id"]);
+  ASSERT_TRUE(at_hand());
+  EXPECT_EQ(Json::parse(at_hand()->body)["properties"]["site"], json(site)["id"]);
+  post("/api/v1/calibrations/" + calibration() + "/publish", "");
+  EXPECT_FALSE(at_hand()) << "a new revision";
+}
+
 TEST_F(Resources, PublishOnlyWhatIsBelievedUnlessAReasonIsGiven) {
   const auto id = calibration();
   EXPECT_TRUE(json(get("/api/v1/anchors"))["features"].empty());
