@@ -134,7 +134,7 @@ TEST(GatewayOutbox, HasEveryRowItAcknowledgedAfterKill9AtRandomInstants) {
   std::uint64_t acknowledged = 0;
   for (int round = 0; round < 25; ++round) {
     Child child([&](int out) { return keep_on(dir.path(), out); });
-    for (unsigned n = 1 + random() % 20; n > 0 && child.read_byte(); --n) ++acknowledged;
+    for (auto n = 1 + random() % 20; n > 0 && child.read_byte(); --n) ++acknowledged;
     std::this_thread::sleep_for(std::chrono::microseconds(random() % 2000));
     child.kill_now();
     while (child.read_byte()) ++acknowledged;  // written before its end: acknowledged as well
