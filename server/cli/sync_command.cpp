@@ -1,6 +1,5 @@
 #include <CLI/CLI.hpp>
 #include <cstdio>
-#include <cstdlib>
 #include <memory>
 
 #include "core/base/text.hpp"
@@ -14,10 +13,10 @@
 namespace anchord::cli {
 namespace {
 
-constexpr int k_undecided = 3;  ///< a person has to say whose positions stand
+constexpr int k_undecided = 3;  ///< a person has to decide whose positions hold
 
 struct Options {
-  std::string to, token_file, data_dir{"anchord-data"}, url;
+  std::string to, token_file, data_dir{"anchord-data"}, url, url_token_file;
   std::vector<std::string> keep;
   int wait_s{60};
   bool dry_run{false};
@@ -28,14 +27,14 @@ int fail(const std::string& message, int code) {
   return code;
 }
 
-/// "ours", "theirs", or one of them for a site: "Hall 3=ours".
+/// "field", "centre", or one of them for a site: "Hall 3=field".
 Result<sync::Decisions> decisions_of(const std::vector<std::string>& words) {
   sync::Decisions out;
   for (const auto& word : words) {
     const auto equals = word.rfind('=');
     const auto keep = sync::k_keep_words.find(equals == std::string::npos ? word : word.substr(equals + 1));
     if (!keep)
-      return make_error(Errc::invalid_argument, "--keep " + word + ": say ours, theirs, or SITE=ours");
+      return make_error(Errc::invalid_argument, "--keep " + word + ": must be field, centre, or SITE=field");
     if (equals == std::string::npos)
       out.everywhere = *keep;
     else
@@ -44,26 +43,18 @@ Result<sync::Decisions> decisions_of(const std::vector<std::string>& words) {
   return out;
 }
 
-/// A folder for bundles on their way, gone in the end.
-class Scratch {
- public:
-  Scratch() {
-    std::string pattern = (std::filesystem::temp_directory_path() / "anchord-sync-XXXXXX").string();
-    if (::mkdtemp(pattern.data()) != nullptr) path_ = pattern;
-  }
-  ~Scratch() {
-    std::error_code ignored;
-    if (!path_.empty()) std::filesystem::remove_all(path_, ignored);
-  }
-  Scratch(const Scratch&) = delete;
-  Scratch& operator=(const Scratch&) = delete;
-  const std::filesystem::path& path() const { return path_; }
-
- private:
-  std::filesystem::path path_;
-};
-
 unsigned long long n(std::uint64_t value) { return value; }
+
+void print(const sync::Conflict& conflict) {
+  const std::string site = conflict.site_id.empty() ? "anchors without a site"
+                                                    : conflict.site_name + " (" + conflict.site_id + ")";
+  std::printf("CONFLICT %s\n", printable(site).c_str());
+  for (const auto& anchor : conflict.anchors) {
+    std::printf("  %s\n    field   %s\n    centre  %s\n", printable(anchor.network_id).c_str(),
+                printable(anchor.field).c_str(), printable(anchor.centre).c_str());
+    if (anchor.distance_m) std::printf("    apart   %.3f m\n", *anchor.distance_m);
+  }
+}
 
 void print(const sync::Outcome& o, bool dry_run) {
   if (!dry_run)
@@ -72,18 +63,17 @@ void print(const sync::Outcome& o, bool dry_run) {
         "anchors: %llu published, %llu there already, %llu left as they are there\n",
         n(o.flights_sent), n(o.flights_there), n(o.flights_recording), n(o.models_sent), n(o.models_there),
         n(o.anchors_published), n(o.anchors_there), n(o.anchors_left));
-  for (const auto& c : o.undecided) {
-    std::string anchors;
-    for (const auto& id : c.anchors) anchors += (anchors.empty() ? "" : " ") + id;
-    const std::string site = c.site_id.empty() ? "no site" : c.site_name + " (" + c.site_id + ")";
-    std::printf("CONFLICT %s\n  ours    %s\n  theirs  %s\n  anchors %s\n", printable(site).c_str(),
-                printable(c.ours).c_str(), printable(c.theirs).c_str(), printable(anchors).c_str());
-  }
+  for (const auto& conflict : o.undecided) print(conflict);
   if (!o.undecided.empty())
     std::printf(
-        "both sides published these: decide by --keep 'SITE=ours' or --keep 'SITE=theirs' (name or id), or "
-        "--keep ours|theirs for all\n");
+        "Both sides published these: decide by --keep 'SITE=field' or --keep 'SITE=centre' (name or id), or "
+        "by --keep field|centre for all\n");
   for (const auto& one : o.failed) std::printf("FAILED %s\n", printable(one).c_str());
+}
+
+Result<std::string> field_token(const Options& options) {
+  if (!options.url_token_file.empty()) return read_token_file(options.url_token_file);
+  return folder_token(options.data_dir);
 }
 
 Result<sync::Outcome> run(const Options& options, const sync::Decisions& decisions) {
@@ -91,21 +81,23 @@ Result<sync::Outcome> run(const Options& options, const sync::Decisions& decisio
   if (!local)
     return make_error(Errc::not_found, "no server runs in " + options.data_dir +
                                            ": start anchord serve there, or name the field server by --url");
-  BOOST_OUTCOME_TRY(const auto token, read_token_file(options.token_file));
-  const std::chrono::seconds give_up(options.wait_s);
-  BOOST_OUTCOME_TRY(const auto field,
-                    sync::Peer::to({*local, own_token(options.data_dir), give_up, interrupted}));
-  BOOST_OUTCOME_TRY(const auto centre, sync::Peer::to({options.to, token, give_up, interrupted}));
-  const Scratch scratch;
-  if (scratch.path().empty()) return make_error(Errc::storage_unavailable, "no temporary folder can be made");
-  std::error_code ignored;
-  const bool has_folder = std::filesystem::is_directory(options.data_dir, ignored);
+  sync::PeerOptions peer;
+  peer.give_up = std::chrono::seconds(options.wait_s);
+  peer.cancelled = interrupted;
+  peer.report = [](const std::string& line) { std::fprintf(stderr, "%s\n", printable(line).c_str()); };
+  peer.url = *local;
+  peer.token_option = "--url-token-file";
+  BOOST_OUTCOME_TRY(peer.token, field_token(options));
+  BOOST_OUTCOME_TRY(const auto field, sync::Peer::to(peer));
+  peer.url = options.to;
+  peer.token_option = "--token-file";
+  BOOST_OUTCOME_TRY(peer.token, read_token_file(options.token_file));
+  BOOST_OUTCOME_TRY(const auto centre, sync::Peer::to(peer));
   sync::SyncOptions how;
   how.dry_run = options.dry_run;
   how.decisions = decisions;
-  how.scratch = scratch.path();
-  how.state_file = (has_folder ? std::filesystem::path(options.data_dir) : scratch.path()) / "sync.json";
-  how.tell = [](const std::string& line) { std::fprintf(stderr, "%s\n", printable(line).c_str()); };
+  how.state_file = std::filesystem::path(options.data_dir) / "sync.json";
+  how.report = peer.report;
   return sync::sync_up(*field, *centre, how);
 }
 
@@ -128,7 +120,7 @@ int sync_command(const Options& options) {
 
 void add_sync_command(CLI::App& app, int& exit_code) {
   auto* command = app.add_subcommand(
-      "sync", "Bring finished flights, models and published positions of a running server to another");
+      "sync", "Send finished flights, models and published positions of a running server to another");
   const auto options = std::make_shared<Options>();
   command->add_option("--to", options->to, "address of the centre, like https://centre.example")->required();
   command->add_option("--token-file", options->token_file,
@@ -137,9 +129,11 @@ void add_sync_command(CLI::App& app, int& exit_code) {
       ->add_option("--data-dir", options->data_dir, "folder of the field server, which runs [anchord-data]")
       ->envname("ANCHORD_DATA_DIR");
   command->add_option("--url", options->url, "address of the field server; else that of its folder");
+  command->add_option("--url-token-file", options->url_token_file,
+                      "file with an access token of the field server; else the admin token of its folder");
   command
       ->add_option("--keep", options->keep,
-                   "where both published: ours or theirs, or of one site SITE=ours; may be repeated")
+                   "where both published: field or centre, or of one site SITE=field; may be repeated")
       ->allow_extra_args(false);
   command->add_option("--wait", options->wait_s, "seconds to wait for a server that does not answer [60]")
       ->check(CLI::Range(1, 86'400));

@@ -1,8 +1,13 @@
-// Published positions. Each anchor is looked at by itself, as files are in a merge: the calibration that its
+// Published positions. Each anchor is compared by itself, as files are in a merge: the calibration that its
 // position rests on here and there, and those that it rested on before.
+#include <algorithm>
+#include <cstdio>
+#include <map>
 #include <nlohmann/json.hpp>
 
+#include "core/base/sha256.hpp"
 #include "core/base/to_wire.hpp"
+#include "core/geo/enu.hpp"
 #include "server/sync/peer.hpp"
 #include "server/sync/sync.hpp"
 
@@ -12,24 +17,40 @@ namespace {
 using Json = nlohmann::json;
 
 struct Position {
-  std::string network_id, site, calibration, override_reason, shown;
+  std::string network_id, site, calibration, override_reason, revision, calibrated_at;
+  std::optional<Wgs84> at{};
 };
+
+std::optional<Wgs84> point_of(const Json& feature) {
+  const Json& c = member(member(feature, "geometry"), "coordinates");
+  if (!c.is_array() || c.size() != 3) return std::nullopt;
+  for (const auto& one : c)
+    if (!one.is_number()) return std::nullopt;
+  return Wgs84{c[1].get<double>(), c[0].get<double>(), c[2].get<double>()};
+}
 
 Position position_of(const Json& feature) {
   Position out;
-  const auto p = feature.value("properties", Json::object());
+  const Json& p = member(feature, "properties");
   out.network_id = text_of(p, "network_id");
   out.site = text_of(p, "site");
-  out.calibration = text_of(p.value("provenance", Json::object()), "calibration");
-  if (const auto quality = p.find("quality"); quality != p.end() && quality->is_object()) {
-    if (const auto reason = quality->find("override"); reason != quality->end() && reason->is_object())
-      out.override_reason = text_of(*reason, "reason");
-  }
-  out.shown = "revision " + (p.contains("revision") ? to_wire(p["revision"]) : std::string("?")) +
-              ", calibrated " + text_of(p, "calibrated_at");
+  out.calibration = text_of(member(p, "provenance"), "calibration");
+  out.override_reason = text_of(member(member(p, "quality"), "override"), "reason");
+  out.revision = to_wire(member(p, "revision"));
+  out.calibrated_at = text_of(p, "calibrated_at");
+  out.at = point_of(feature);
   return out;
 }
 
+std::string in_words(const Position& position) {
+  char at[80] = "not on the globe";
+  if (position.at)
+    std::snprintf(at, sizeof at, "%.9f, %.9f, %.3f m", position.at->lat_deg, position.at->lon_deg,
+                  position.at->height_m);
+  return std::string(at) + ", revision " + position.revision + ", calibrated " + position.calibrated_at;
+}
+
+/// By network id; those whose calibration is known.
 Result<std::map<std::string, Position>> published(Peer& peer) {
   BOOST_OUTCOME_TRY(const auto features, peer.list("/api/v1/anchors"));
   std::map<std::string, Position> out;
@@ -41,11 +62,10 @@ Result<std::map<std::string, Position>> published(Peer& peer) {
 }
 
 /// Whether the anchor's position rested on this calibration at some time.
-Result<bool> knew(Peer& peer, const std::string& network_id, const std::string& calibration) {
-  BOOST_OUTCOME_TRY(const auto history, peer.list("/api/v1/anchors/" + network_id + "/history"));
-  for (const auto& item : history) {
+Result<bool> had(Peer& peer, const std::string& network_id, const std::string& calibration) {
+  BOOST_OUTCOME_TRY(const auto history, peer.get("/api/v1/anchors/" + network_id + "/history"));
+  for (const auto& item : member(history, "items"))
     if (text_of(item, "calibration") == calibration) return true;
-  }
   return false;
 }
 
@@ -63,7 +83,7 @@ class Positions {
     for (const auto& [id, mine] : ours) {
       const auto there = theirs.find(id);
       if (there == theirs.end()) {
-        wanted_[mine.calibration].push_back({mine, {}});
+        wanted_[mine.calibration].push_back({mine, {}, {}});
         continue;
       }
       BOOST_OUTCOME_TRYV(compare(mine, there->second));
@@ -78,7 +98,8 @@ class Positions {
  private:
   struct Wanted {
     Position position;
-    std::string decided;  ///< the reason that overrides the gates there; empty: none but its own
+    std::string over;     ///< the revision at the centre that it follows; empty: none
+    std::string decided;  ///< by a person; also the reason where a gate fails there
   };
 
   Result<void> compare(const Position& mine, const Position& there) {
@@ -86,38 +107,38 @@ class Positions {
       ++out_.anchors_there;
       return boost::outcome_v2::success();
     }
-    BOOST_OUTCOME_TRY(const bool moved_on_here, knew(field_, mine.network_id, there.calibration));
-    if (moved_on_here) {
-      wanted_[mine.calibration].push_back({mine, {}});
+    BOOST_OUTCOME_TRY(const bool field_moved_on, had(field_, mine.network_id, there.calibration));
+    if (field_moved_on) {
+      wanted_[mine.calibration].push_back({mine, there.revision, {}});
       return boost::outcome_v2::success();
     }
-    BOOST_OUTCOME_TRY(const bool moved_on_there, knew(centre_, mine.network_id, mine.calibration));
-    if (moved_on_there) {
+    BOOST_OUTCOME_TRY(const bool centre_moved_on, had(centre_, mine.network_id, mine.calibration));
+    if (centre_moved_on) {
       ++out_.anchors_there;
       return boost::outcome_v2::success();
     }
-    auto& conflict = conflicts_[mine.site];
-    conflict.first.anchors.push_back(mine.network_id);
-    conflict.first.ours = mine.shown;
-    conflict.first.theirs = there.shown;
-    conflict.second.push_back(mine);
+    conflicts_[mine.site].emplace_back(mine, there);
     return boost::outcome_v2::success();
   }
 
   void decide() {
-    for (auto& [site, found] : conflicts_) {
-      auto& [conflict, anchors] = found;
-      conflict.site_id = site;
-      conflict.site_name = site_names_[site];
-      const auto keep = options_.decisions.of(site, conflict.site_name);
-      if (!keep) {
-        out_.undecided.push_back(conflict);
-      } else if (*keep == Keep::theirs) {
+    for (const auto& [site, anchors] : conflicts_) {
+      const std::string& name = site_names_[site];
+      const auto keep = options_.decisions.of(site, name);
+      if (keep == Keep::centre) {
         out_.anchors_left += anchors.size();
+      } else if (keep == Keep::field) {
+        for (const auto& [mine, there] : anchors)
+          wanted_[mine.calibration].push_back(
+              {mine, there.revision, "kept over revision " + there.revision + " of the centre"});
       } else {
-        for (const auto& one : anchors)
-          wanted_[one.calibration].push_back(
-              {one, "kept by a person over " + conflict.theirs + " (anchord sync --keep ours)"});
+        Conflict conflict{site, name, {}};
+        for (const auto& [mine, there] : anchors) {
+          std::optional<double> distance_m;
+          if (mine.at && there.at) distance_m = EnuFrame(*there.at).enu_from_wgs84(*mine.at).m.norm();
+          conflict.anchors.push_back({mine.network_id, in_words(mine), in_words(there), distance_m});
+        }
+        out_.undecided.push_back(std::move(conflict));
       }
     }
   }
@@ -126,27 +147,36 @@ class Positions {
     const std::string name =
         "calibration " + calibration + ", " + std::to_string(anchors.size()) + " anchors";
     if (options_.dry_run) {
-      options_.tell(name + ": would publish");
+      options_.report(name + ": would publish");
       return boost::outcome_v2::success();
     }
-    Json body{{"anchors", Json::array()},
-              {"overrides", Json::array()},
-              {"note", "by anchord sync from " + field_.url()}};
-    for (const auto& [position, decided] : anchors) {
+    Json body{{"anchors", Json::array()}, {"overrides", Json::array()}};
+    std::string note = "anchord sync from " + field_.url();
+    Sha256 once;
+    once.add(calibration);
+    for (const auto& [position, over, decided] : anchors) {
       body["anchors"].push_back(position.network_id);
+      once.add(position.network_id + ' ' + over + '\n');
       const auto& reason = position.override_reason.empty() ? decided : position.override_reason;
       if (!reason.empty())
         body["overrides"].push_back({{"network_id", position.network_id}, {"reason", reason}});
     }
-    BOOST_OUTCOME_TRY(
-        const auto answer,
-        centre_.call("POST", "/api/v1/calibrations/" + calibration + "/publish", to_wire(body)));
+    if (const auto over =
+            std::ranges::find_if(anchors, [](const Wanted& one) { return !one.decided.empty(); });
+        over != anchors.end())
+      note += ": " + over->decided;
+    body["note"] = note;
+    const std::string text = to_wire(body);
+    PeerRequest request{"POST", "/api/v1/calibrations/" + calibration + "/publish", text};
+    // An answer that was lost must not become a second revision.
+    request.idempotency_key = "sync-" + once.hex();
+    BOOST_OUTCOME_TRY(const auto answer, centre_.call(request));
     if (answer.status == 201) {
       out_.anchors_published += anchors.size();
-      options_.tell(name + ": published");
+      options_.report(name + ": published");
     } else {
-      out_.failed.push_back(name + ": " + told(answer));
-      options_.tell(out_.failed.back());
+      out_.failed.push_back(name + ": " + sync::in_words(answer));
+      options_.report(out_.failed.back());
     }
     return boost::outcome_v2::success();
   }
@@ -156,9 +186,9 @@ class Positions {
   const SyncOptions& options_;
   Outcome& out_;
   std::map<std::string, std::string> site_names_;
-  std::map<std::string, std::vector<Wanted>>
-      wanted_;  ///< by calibration; ids are of their time, so oldest first
-  std::map<std::string, std::pair<Conflict, std::vector<Position>>> conflicts_;
+  /// By calibration; ids are of their time, so oldest first.
+  std::map<std::string, std::vector<Wanted>> wanted_;
+  std::map<std::string, std::vector<std::pair<Position, Position>>> conflicts_;  ///< by site: here, there
 };
 
 }  // namespace
@@ -172,14 +202,6 @@ std::optional<Keep> Decisions::of(const std::string& site_id, const std::string&
 
 Result<void> publish_positions(Peer& field, Peer& centre, const SyncOptions& options, Outcome& outcome) {
   return Positions(field, centre, options, outcome).run();
-}
-
-Result<Outcome> sync_up(Peer& field, Peer& centre, const SyncOptions& options) {
-  Outcome outcome;
-  BOOST_OUTCOME_TRYV(send_flights(field, centre, options, outcome));
-  BOOST_OUTCOME_TRYV(send_models(field, centre, options, outcome));
-  BOOST_OUTCOME_TRYV(publish_positions(field, centre, options, outcome));
-  return outcome;
 }
 
 }  // namespace anchord::sync
