@@ -1,4 +1,5 @@
-// A field server's work goes to the centre over a link that is cut, by a sync that is killed, to a centre that dies or is none; and where both published, a person decides.
+// A field server's work goes to the centre: over a link that is cut, by a sync that is killed, to a centre that dies or is none;
+// and where both published, a person decides.
 import assert from 'node:assert/strict';
 import { spawn } from 'node:child_process';
 import { existsSync, mkdtempSync, rmSync, writeFileSync } from 'node:fs';
@@ -342,6 +343,18 @@ test('where both published it shows both positions and asks; centre leaves them,
     at_centre.missions.some(([mission]) => mission === ours.id),
     'the flight went all the same',
   );
+
+  const origin = { lon: 3.713, lat: 51.023, h_m: 55.4 };
+  const site = await ok(field, '/api/v1/sites', { json: { name: 'Hall 3', origin } });
+  const etag = (await field.fetch(`/api/v1/anchors/${id}`)).headers.get('etag');
+  const patch = { method: 'PATCH', headers: { 'if-match': etag }, json: { site: site.id } };
+  await ok(field, `/api/v1/anchors/${id}`, patch);
+  const one = await sync('--keep', 'Hall 3=field');
+  assert.equal(one.code, 3, one.stdout + one.stderr);
+  assert.match(one.stdout, /anchors: 1 published/);
+  assert.doesNotMatch(one.stdout, /CONFLICT Hall 3/);
+  before[id] = here[id];
+  assert.deepEqual(await published(centre), before, 'the anchor of that site alone');
 
   const left = await sync('--keep', 'centre');
   assert.equal(left.code, 0, left.stdout + left.stderr);
