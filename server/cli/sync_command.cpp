@@ -4,7 +4,6 @@
 
 #include "core/base/text.hpp"
 #include "server/cli/commands.hpp"
-#include "server/cli/progress.hpp"
 #include "server/cli/rest_client.hpp"
 #include "server/cli/server_address.hpp"
 #include "server/sync/peer.hpp"
@@ -83,7 +82,6 @@ Result<sync::Outcome> run(const Options& options, const sync::Decisions& decisio
                                            ": start anchord serve there, or name the field server by --url");
   sync::PeerOptions peer;
   peer.give_up = std::chrono::seconds(options.wait_s);
-  peer.cancelled = interrupted;
   peer.report = [](const std::string& line) { std::fprintf(stderr, "%s\n", printable(line).c_str()); };
   peer.url = *local;
   peer.token_option = "--url-token-file";
@@ -104,7 +102,6 @@ Result<sync::Outcome> run(const Options& options, const sync::Decisions& decisio
 int sync_command(const Options& options) {
   const auto decisions = decisions_of(options.keep);
   if (!decisions) return fail(decisions.error().message, 2);
-  (void)interrupted();
   const auto outcome = run(options, decisions.value());
   if (!outcome) {
     const bool input = outcome.error().code == Errc::invalid_argument;

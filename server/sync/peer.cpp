@@ -20,7 +20,7 @@ using Monotonic = std::chrono::steady_clock;
 constexpr milliseconds k_answer_time{30'000};
 /// Five million rows, the most of a bundle, are taken in within some minutes.
 constexpr milliseconds k_bundle_answer_time{600'000};
-constexpr milliseconds k_first_pause{500}, k_longest_pause{15'000}, k_look_every{100};
+constexpr milliseconds k_first_pause{500}, k_longest_pause{15'000};
 constexpr int k_most_pages = 10'000;  ///< ten million items: more than any server has
 
 Errc errc_of(int status) {
@@ -58,15 +58,6 @@ Result<std::unique_ptr<Peer>> Peer::to(const PeerOptions& options) {
   return std::unique_ptr<Peer>(new Peer(options, std::move(quick), std::move(slow)));
 }
 
-bool Peer::pause(milliseconds length) const {
-  const auto until = Monotonic::now() + length;
-  while (Monotonic::now() < until) {
-    if (options_.cancelled()) return false;
-    std::this_thread::sleep_for(std::min<Monotonic::duration>(k_look_every, until - Monotonic::now()));
-  }
-  return !options_.cancelled();
-}
-
 Result<server::ClientResponse> Peer::call(const PeerRequest& request) {
   static std::minstd_rand chance{std::random_device{}()};
   gateway::Pauses pauses{k_first_pause, k_longest_pause};
@@ -75,7 +66,6 @@ Result<server::ClientResponse> Peer::call(const PeerRequest& request) {
   if (!request.idempotency_key.empty()) headers.emplace("Idempotency-Key", request.idempotency_key);
   std::optional<Monotonic::time_point> away_since;
   for (;;) {
-    if (options_.cancelled()) return make_error(Errc::canceled, "stopped");
     const auto began = Monotonic::now();
     auto answer = (request.bundle ? slow_ : quick_)
                       .call(request.method, request.target, request.body, request.type, headers);
@@ -99,7 +89,7 @@ Result<server::ClientResponse> Peer::call(const PeerRequest& request) {
       options_.report(why + "; trying again for " + std::to_string(options_.give_up.count()) + " s");
     }
     if (now + wait > *away_since + options_.give_up) return make_error(Errc::link_lost, why);
-    if (!pause(wait)) return make_error(Errc::canceled, "stopped");
+    std::this_thread::sleep_for(wait);
   }
 }
 

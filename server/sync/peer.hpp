@@ -17,7 +17,6 @@ struct PeerOptions {
   std::string url, token;
   std::string token_option;          ///< of the command line, for the error text
   std::chrono::seconds give_up{60};  ///< after so long without a useful answer
-  std::function<bool()> cancelled;
   std::function<void(const std::string& line)> report;
 };
 
@@ -39,7 +38,7 @@ class Peer {
   static Result<std::unique_ptr<Peer>> to(const PeerOptions& options);
 
   const std::string& url() const { return options_.url; }
-  /// Any answer that is not "again later". errors: link_lost (gave up), canceled, storage_full (507),
+  /// Any answer that is not "again later". errors: link_lost (gave up), storage_full (507),
   /// invalid_argument (401, 403)
   Result<server::ClientResponse> call(const PeerRequest& request);
   /// Body of the 2xx as a JSON object. errors: as call; not_found, conflict and invalid_argument of the
@@ -53,7 +52,6 @@ class Peer {
  private:
   Peer(PeerOptions options, server::HttpClient quick, server::HttpClient slow)
       : options_(std::move(options)), quick_(std::move(quick)), slow_(std::move(slow)) {}
-  bool pause(std::chrono::milliseconds length) const;
 
   PeerOptions options_;
   server::HttpClient quick_, slow_;

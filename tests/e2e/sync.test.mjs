@@ -260,6 +260,13 @@ test('what moved on in the field moves on at the centre without a question, whil
 
 test('killed at any moment, with a centre that is killed as well, it brings everything once', async () => {
   flights.push(await fly(field, 17));
+  proxy.bytesPerS = 5_000; // some minutes for a bundle
+  proxy.toServer = 0;
+  const stopped = spawn(binary, words(proxy.url), { stdio: 'ignore' });
+  const end = new Promise((done) => stopped.once('exit', (code, signal) => done(signal)));
+  await eventually('the flight is on its way', () => proxy.toServer > 5_000, 30_000);
+  stopped.kill('SIGINT');
+  assert.equal(await Promise.race([end, new Promise((done) => setTimeout(done, 5_000, 'late'))]), 'SIGINT');
   proxy.bytesPerS = 400_000;
   let kills = 0;
   for (let ms = 20; ms < 1500; ms += 90) {
@@ -271,6 +278,7 @@ test('killed at any moment, with a centre that is killed as well, it brings ever
   }
   assert.ok(kills > 5, `${kills} kills`);
   flights.push(await fly(field, 19));
+  proxy.toServer = 0;
   const through = sync('--wait', '60');
   await eventually('the flight is on its way', () => proxy.toServer > 20_000, 30_000);
   await centre.kill();
