@@ -26,6 +26,7 @@ constexpr Command k_commands[]{
     {"Run a server", anchord::cli::add_backup_command},
     {"Run a server", anchord::cli::add_database_command},
     {"Run a server", anchord::cli::add_gateway_command},
+    {"Run a server", anchord::cli::add_sync_command},
     {"Run a server", anchord::cli::add_config_command},
     {"Run a server", anchord::cli::add_healthcheck_command},
     {"Plan and measure", anchord::cli::add_plan_command},

@@ -71,7 +71,8 @@ set(rows
   "server/flight: core/base core/types core/ports core/geo core/planning core/localize core/procedure core/flight drivers/link drivers/mavlink drivers/drone drivers/sim"
   "server/app: core/base drivers/link drivers/drone api/kit api/stream api/admin api/learning api/mqtt api server/storage server/mqtt server/runtime server/tls server/http server/config server/flight"
   "server/gateway: core/base core/ports api/kit api/measurements server/storage server/runtime server/http"
-  "server/cli: core/base core/types core/ports core/geo core/planning core/localize drivers/link drivers/gnss drivers/device drivers/sim api/wire api/formats api/admin api/learning api/measurements api/anchors api/calibration server/storage server/runtime server/tls server/http server/config server/flight server/app server/gateway"
+  "server/sync: core/base core/geo api/kit api/formats api/measurements server/runtime server/http server/gateway"
+  "server/cli: core/base core/types core/ports core/geo core/planning core/localize drivers/link drivers/gnss drivers/device drivers/sim api/wire api/formats api/admin api/learning api/measurements api/anchors api/calibration server/storage server/runtime server/tls server/http server/config server/flight server/app server/gateway server/sync"
   "server: core/base server/cli")
 set(from_outside web)  # made by the build
 set(everywhere "Eigen/|boost/outcome/")

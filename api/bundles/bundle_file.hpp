@@ -13,7 +13,6 @@ class SpoolFolder;
 /// Rows a table may have: what one transaction takes in without the server's other writes waiting for long.
 inline constexpr std::uint64_t k_bundle_rows = 5'000'000;
 inline constexpr std::uint64_t k_bundle_bytes = std::uint64_t{2} << 30;  ///< of the file
-inline constexpr const char* k_bundle_type = "application/vnd.anchord.bundle+zip";
 
 /// A bundle in the folder; its path. errors: those of BundleStore::write_out and ZipWriter
 Result<std::filesystem::path> make_bundle(BundleApi& api, const Mission& mission, const Principal& who,

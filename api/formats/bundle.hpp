@@ -18,6 +18,7 @@ namespace anchord::api {
 
 inline constexpr std::string_view k_bundle_manifest = "manifest.json";
 inline constexpr std::string_view k_bundle_notes = "notes/";
+inline constexpr const char* k_bundle_type = "application/vnd.anchord.bundle+zip";
 inline constexpr int k_bundle_version = 1;
 
 struct BundleEntry {

@@ -5,7 +5,7 @@ class App;
 }
 
 /// Each subcommand lives in its own file and adds itself to the app; its callback sets the exit code.
-/// Exit codes: 0 done, 1 failed, 2 unusable input or arguments.
+/// Exit codes: 0 done, 1 failed, 2 unusable input or arguments, 3 (sync) a person has to decide.
 namespace anchord::cli {
 
 void add_backup_command(CLI::App& app, int& exit_code);
@@ -26,6 +26,7 @@ void add_serve_command(CLI::App& app, int& exit_code);
 void add_replay_command(CLI::App& app, int& exit_code);
 void add_simulate_command(CLI::App& app, int& exit_code);
 void add_support_command(CLI::App& app, int& exit_code);
+void add_sync_command(CLI::App& app, int& exit_code);
 void add_tls_command(CLI::App& app, int& exit_code);
 void add_token_command(CLI::App& app, int& exit_code);
 void add_top_command(CLI::App& app, int& exit_code);

@@ -29,9 +29,13 @@ std::optional<std::string> running_server(const std::filesystem::path& data_dir)
   return line.empty() ? std::nullopt : std::optional(std::move(line));
 }
 
+std::string folder_token(const std::filesystem::path& data_dir) {
+  return first_line(data_dir / server::k_admin_token_file);
+}
+
 std::string own_token(const std::filesystem::path& data_dir) {
   if (const char* given = std::getenv("ANCHORD_TOKEN")) return given;
-  return first_line(data_dir / server::k_admin_token_file);
+  return folder_token(data_dir);
 }
 
 }  // namespace anchord::cli

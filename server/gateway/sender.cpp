@@ -89,7 +89,7 @@ class Sender::Impl {
     } else if (remembered_ && std::abs(seconds_between(remembered_->at, clock_.now())) < k_remember_s) {
       record(remembered_->mission, MissionFrom::remembered);
     } else {
-      record(unassigned(), MissionFrom::nobody);
+      record(unassigned(), MissionFrom::unassigned);
     }
     thread_ = Thread("anchord-send", [this] { run(); });
   }

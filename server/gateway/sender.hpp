@@ -16,12 +16,12 @@ namespace anchord::gateway {
 
 /// How the gateway knows which mission its rows belong to.
 enum class MissionFrom : std::uint8_t {
-  nobody,      ///< the server was never asked: rows are kept without a mission
+  unassigned,  ///< the server was never asked: rows are kept without a mission
   given,       ///< --mission
   remembered,  ///< of before the restart, a few minutes ago
   server,      ///< the one that has the server's devices
 };
-inline constexpr auto k_mission_from_words = enum_table<MissionFrom>({{"nobody", MissionFrom::nobody},
+inline constexpr auto k_mission_from_words = enum_table<MissionFrom>({{"unassigned", MissionFrom::unassigned},
                                                                       {"given", MissionFrom::given},
                                                                       {"remembered", MissionFrom::remembered},
                                                                       {"server", MissionFrom::server}});
@@ -31,7 +31,7 @@ struct SenderOptions {
   std::filesystem::path token_file;  ///< read at every attempt after trouble; empty: no token is sent
   std::filesystem::path data_dir;    ///< rejected.ndjson is in it
   std::optional<MissionId> mission{};
-  /// Rows of the devices are of this mission from now on; absent: nobody keeps them.
+  /// Rows of the devices are of this mission from now on; absent: they are not kept.
   std::function<void(const std::optional<MissionId>&)> record_into;
   std::function<void(const std::string& text)> log;
 };
@@ -45,7 +45,7 @@ struct SenderStatus {
   std::uint64_t requests{}, bytes_sent{};
   double bytes_per_s{};  ///< of the newest requests with rows
   std::optional<MissionId> mission{};
-  MissionFrom mission_from{MissionFrom::nobody};
+  MissionFrom mission_from{MissionFrom::unassigned};
   std::string mission_problem;            ///< why the mission cannot be asked for
   std::map<MissionId, std::string> held;  ///< missions the server does not know: what it says
 };

@@ -32,6 +32,7 @@ constexpr const char* k_any_mission = "SELECT mission_key FROM mission WHERE id 
 constexpr const char* k_insert_cir =
     "INSERT INTO cir (range_id, dt_ps, first_path_idx, preamble_count, re_im) VALUES (?1, ?2, ?3, ?4, ?5)";
 constexpr const char* k_revisions = "SELECT number FROM revision";
+constexpr const char* k_frame_named = "SELECT id FROM local_frame WHERE name = ?1";
 constexpr const char* k_count_fixes_anew =
     "INSERT INTO mission_fixes (mission_key, n_fixes) SELECT mission_key, count(*) FROM fix WHERE "
     "mission_key = "
@@ -225,6 +226,7 @@ class Reader {
                                             " is in the bin here: restore it, or remove it for good");
     BOOST_OUTCOME_TRY(leave_out_calibrations());
     BOOST_OUTCOME_TRY(leave_out_revisions());
+    BOOST_OUTCOME_TRY(leave_out_profiles());
     for (const auto& spec : bundle_specs()) {
       BOOST_OUTCOME_TRY(take(spec));
     }
@@ -291,6 +293,21 @@ class Reader {
     return boost::outcome_v2::success();
   }
 
+  /// Every server learns the profile of a kit for itself, and numbers its versions from 1. Those of a bundle
+  /// go on from what is here, or stay out.
+  Result<void> leave_out_profiles() {
+    const BundleSpec& spec = spec_named("kit_profile");
+    BOOST_OUTCOME_TRY(source_.open(spec.table));
+    BundleRow row;
+    for (;;) {
+      BOOST_OUTCOME_TRY(const bool more, source_.next(row));
+      if (!more) return boost::outcome_v2::success();
+      const auto here = stored(spec, row);
+      if (!here || differing(spec, *here, row).empty() || !profiles_out_.insert(row[0]).second) continue;
+      out_.left_out.push_back({name_of(spec, row), "this server has learned another profile of the kit"});
+    }
+  }
+
   Result<void> take(const BundleSpec& spec) {
     BundleOutcome::Table counted{spec.table.name, 0, 0};
     BOOST_OUTCOME_TRY(source_.open(spec.table));
@@ -315,6 +332,8 @@ class Reader {
 
   bool skipped(const BundleSpec& spec, const BundleRow& row) const {
     if (spec.part == BundlePart::revision) return revisions_out_;
+    if (spec.table.name == "kit_profile") return profiles_out_.contains(row[0]);
+    if (spec.table.name == "anchor_external_id") return anchors_out_.contains(row[0]);
     return spec.part == BundlePart::calibration && calibrations_out_.contains(uuid_of(row[0]));
   }
 
@@ -325,12 +344,22 @@ class Reader {
     // What belongs to a flight that came just now cannot be here yet.
     const bool nothing_yet = fresh_ && (spec.part == BundlePart::measured || spec.part == BundlePart::own);
     if (!nothing_yet) {
-      BOOST_OUTCOME_TRY(const bool here, is_here(spec, row));
-      if (here) return false;
+      if (const auto here = stored(spec, row)) {
+        if (const auto column = differing(spec, *here, row); !column.empty()) {
+          BOOST_OUTCOME_TRY(stays(spec, row, column));
+        }
+        return false;
+      }
       if (spec.part == BundlePart::measured)
         return make_error(Errc::conflict, "mission " + to_string(mission_) + " is here without " +
                                               name_of(spec, row) +
                                               " of the bundle: it is another flight of the same id");
+    }
+    if (spec.table.name == "local_frame" && frame_named(row[1])) {
+      out_.left_out.push_back(
+          {name_of(spec, row),
+           "another frame is called " + in_words(row[1], spec.table.columns[1]) + " here, and stays"});
+      return false;
     }
     BOOST_OUTCOME_TRY(add(spec, row));
     return true;
@@ -347,7 +376,7 @@ class Reader {
     return boost::outcome_v2::success();
   }
 
-  Result<bool> is_here(const BundleSpec& spec, const BundleRow& row) {
+  std::optional<BundleRow> stored(const BundleSpec& spec, const BundleRow& row) {
     Query query(c_, spec.find);
     if (spec.of_mission) query << key_.value();
     for (const std::size_t key : spec.keys) {
@@ -357,14 +386,33 @@ class Reader {
       else
         bind_cell(query, row[key], spec.table.columns[key].kind);
     }
-    if (!query.step()) return false;
-    const BundleRow stored = read_row(query, spec.table);
-    for (std::size_t i = 0; i < row.size(); ++i) {
-      if (!same(stored[i], row[i]))
-        return make_error(Errc::conflict, name_of(spec, row) + " is here with other content (" +
-                                              spec.table.columns[i].name + "); nothing was imported");
-    }
-    return true;
+    if (!query.step()) return std::nullopt;
+    return read_row(query, spec.table);
+  }
+
+  bool frame_named(const BundleCell& name) {
+    Query query(c_, k_frame_named);
+    bind_cell(query, name, CellKind::text);
+    return query.step();
+  }
+
+  /// The first column in which they differ; empty: none.
+  static std::string differing(const BundleSpec& spec, const BundleRow& here, const BundleRow& row) {
+    for (std::size_t i = 0; i < row.size(); ++i)
+      if (!same(here[i], row[i])) return spec.table.columns[i].name;
+    return {};
+  }
+
+  /// Sites, plans and anchors are edited on every server, and no measurement rests on their words: what is
+  /// here stays, and the flight comes all the same.
+  Result<void> stays(const BundleSpec& spec, const BundleRow& row, const std::string& column) {
+    const std::string what = name_of(spec, row);
+    if (!is_edited(spec.part))
+      return make_error(Errc::conflict,
+                        what + " is here with other content (" + column + "); nothing was imported");
+    if (spec.table.name == "anchor") anchors_out_.insert(row[0]);
+    out_.left_out.push_back({what, "it is here with other content (" + column + "), which stays"});
+    return boost::outcome_v2::success();
   }
 
   Result<void> add(const BundleSpec& spec, const BundleRow& row) {
@@ -421,6 +469,7 @@ class Reader {
   std::optional<std::int64_t> key_;
   bool fresh_{false}, revisions_out_{false};
   std::set<Uuid> calibrations_out_;
+  std::set<BundleCell> profiles_out_, anchors_out_;  ///< kits by name, anchors by the id of the bundle
   BundleOutcome out_;
 };
 

@@ -14,13 +14,18 @@ enum class BundlePart : std::uint8_t {
   site,         ///< one site a query
   plan,         ///< one plan a query
   model,        ///< one model a query
-  shared,       ///< of others too: the same, or added
+  shared,       ///< of other flights too
   mission,      ///< the flight itself
   measured,     ///< never changes after the flight: all there, or none
   own,          ///< of the flight; more may come later
   calibration,  ///< with a calibration, which may be left out
   revision,     ///< with a revision, which may be left out
 };
+
+/// Parts that every server edits for itself.
+constexpr bool is_edited(BundlePart part) {
+  return part == BundlePart::site || part == BundlePart::plan || part == BundlePart::shared;
+}
 
 /// One column of a bundle in SQL.
 struct BundleColumnSql {

@@ -246,6 +246,7 @@ test('without a server at the start rows wait for their mission, which a person 
     await eventually('the tag is there', () => feeder.connected);
     feeder.burst(200);
     await eventually('rows wait', async () => (await gateway.status()).outbox.rows_without_mission === 200);
+    assert.deepEqual((await gateway.status()).mission, { id: null, from: 'unassigned' });
     await proxy.restore();
     const told = await eventually('it says what to do', async () =>
       (await gateway.status()).alarms.find((alarm) => alarm.code === 'gateway.no_mission'),

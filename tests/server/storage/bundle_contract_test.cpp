@@ -3,7 +3,9 @@
 
 #include <map>
 
+#include "core/ports/anchor_store.hpp"
 #include "core/ports/exclusion_store.hpp"
+#include "core/ports/frame_store.hpp"
 #include "core/ports/kit_store.hpp"
 #include "core/ports/revision_store.hpp"
 #include "core/ports/site_store.hpp"
@@ -39,8 +41,8 @@ struct Rows final : BundleSink, BundleSource {
 
 class BundleStoreContract : public StoreContract {
  protected:
-  /// A finished flight with something in nearly every table.
-  MissionId flown() {
+  /// A finished flight with something in nearly every table; its kit learns another version of the profile.
+  MissionId flown(std::uint64_t learned = 0) {
     const Stores s = db_->stores();
     Site site;
     site.id = SiteId{make_uuid_v7(k_noon)};
@@ -67,7 +69,7 @@ class BundleStoreContract : public StoreContract {
     profile.time = k_noon;
     profile.by = profile.source = "test";
     profile.profile = {"{}"};
-    EXPECT_TRUE(s.kits.put(profile, 0));
+    EXPECT_TRUE(s.kits.put(profile, learned));
     Exclusion e;
     e.id = ExclusionId{make_uuid_v7(k_noon)};
     e.mission = m.id;
@@ -80,6 +82,11 @@ class BundleStoreContract : public StoreContract {
     const Calibration c = stored_calibration(m, {0x6a21, 0x6a22});
     EXPECT_TRUE(s.revisions.publish(c.id, {NetworkId{0x6a21}}, "me", "", k_noon));
     return m.id;
+  }
+  static std::vector<std::string> left_out(const BundleOutcome& outcome) {
+    std::vector<std::string> out;
+    for (const auto& one : outcome.left_out) out.push_back(one.what + ": " + one.why);
+    return out;
   }
   static Rows written(Database& db, const MissionId& mission) {
     Rows rows;
@@ -130,6 +137,68 @@ TEST_P(BundleStoreContract, AreRefusedWholeWhereAMeasurementDiffers) {
   rows.tables["estimate"][0][0] = std::string(16, '\0');  // of a calibration that is nowhere
   EXPECT_FALSE(other->stores().bundles.take_in(mission, rows));
   EXPECT_FALSE(other->stores().missions.mission(mission)) << "nothing of it stays";
+}
+
+// A second flight of the kit was refused with 409 "kit_profile kit 2 is here with other content (t_ns)".
+TEST_P(BundleStoreContract, OfALaterFlightOfTheKitComeWhereTheProfileIsTheSameOrAnother) {
+  const auto first = flown();
+  Rows of_first = written(*db_, first);
+  const auto second = flown(1);
+  Rows of_second = written(*db_, second);
+  ScratchDir same, other;
+  const auto follows = open_sqlite(same.path() / "data"), learns = open_sqlite(other.path() / "data");
+  for (Database* db : {follows.get(), learns.get()})
+    ASSERT_TRUE(db->stores().bundles.take_in(first, of_first));
+  StoredProfile own;
+  own.kit = "kit";
+  own.time = k_noon;
+  own.by = own.source = "of its own flight";
+  own.profile = {R"({"own":1})"};
+  ASSERT_TRUE(learns->stores().kits.put(own, 1));
+
+  const auto taken = follows->stores().bundles.take_in(second, of_second);
+  ASSERT_TRUE(taken) << taken.error().message;
+  EXPECT_EQ(follows->stores().kits.profile("kit").value()->version, 2u);
+  const auto beside = learns->stores().bundles.take_in(second, of_second);
+  ASSERT_TRUE(beside) << beside.error().message;
+  EXPECT_THAT(left_out(beside.value()), ::testing::Contains(::testing::HasSubstr("kit_profile kit 2")));
+  EXPECT_EQ(written(*learns, second).tables.at("uwb_range"), of_second.tables.at("uwb_range"));
+  EXPECT_EQ(learns->stores().kits.profile("kit").value()->source, "of its own flight");
+}
+
+TEST_P(BundleStoreContract, LeaveSitesFramesAndAnchorsAsTheyAreHere) {
+  const auto mission = flown();
+  const Stores from = db_->stores();
+  auto site = from.sites.site(*from.missions.mission(mission).value().site).value();
+  auto anchor = from.anchors.find_or_create(NetworkId{0x101}, k_noon).value();
+  anchor.name = "field";
+  anchor.external_ids = {{"cmms", "7"}};
+  ASSERT_TRUE(from.anchors.update(anchor, anchor.version));
+  LocalFrame frame;
+  frame.id = FrameId{make_uuid_v7(k_noon)};
+  frame.name = "hall-a";
+  frame.site = site.id;
+  frame.created = k_noon;
+  ASSERT_TRUE(from.frames.insert(frame));
+  Rows rows = written(*db_, mission);
+  ScratchDir folder;
+  const auto other = open_sqlite(folder.path() / "data");
+  const Stores here = other->stores();
+  site.name = "hall 3";
+  ASSERT_TRUE(here.sites.insert(site));
+  frame.id = FrameId{make_uuid_v7(k_noon)};
+  ASSERT_TRUE(here.frames.insert(frame));
+  ASSERT_TRUE(here.anchors.find_or_create(NetworkId{0x101}, k_noon));
+  const auto taken = here.bundles.take_in(mission, rows);
+  ASSERT_TRUE(taken) << taken.error().message;
+  EXPECT_THAT(left_out(taken.value()),
+              ::testing::UnorderedElementsAre(::testing::HasSubstr("(name), which stays"),
+                                              ::testing::HasSubstr("another frame is called hall-a here"),
+                                              ::testing::HasSubstr("anchor 0x0101")));
+  EXPECT_EQ(here.sites.site(site.id).value().name, "hall 3");
+  EXPECT_EQ(here.anchors.anchor(NetworkId{0x101}).value().name, "");
+  EXPECT_EQ(written(*other, mission).tables.at("uwb_range"), rows.tables.at("uwb_range"));
+  EXPECT_FALSE(here.bundles.take_in(mission, rows).value().added());
 }
 
 TEST_P(BundleStoreContract, AreOfFinishedMissionsAlone) {

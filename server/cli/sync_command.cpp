@@ -1,0 +1,141 @@
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <memory>
+
+#include "core/base/text.hpp"
+#include "server/cli/commands.hpp"
+#include "server/cli/rest_client.hpp"
+#include "server/cli/server_address.hpp"
+#include "server/sync/peer.hpp"
+#include "server/sync/sync.hpp"
+
+namespace anchord::cli {
+namespace {
+
+constexpr int k_undecided = 3;  ///< a person has to decide whose positions hold
+
+struct Options {
+  std::string to, token_file, data_dir{"anchord-data"}, url, url_token_file;
+  std::vector<std::string> keep;
+  int wait_s{60};
+  bool dry_run{false};
+};
+
+int fail(const std::string& message, int code) {
+  std::fprintf(stderr, "anchord sync: %s\n", printable(message).c_str());
+  return code;
+}
+
+/// "field", "centre", or one of them for a site: "Hall 3=field".
+Result<sync::Decisions> decisions_of(const std::vector<std::string>& words) {
+  sync::Decisions out;
+  for (const auto& word : words) {
+    const auto equals = word.rfind('=');
+    const auto keep = sync::k_keep_words.find(equals == std::string::npos ? word : word.substr(equals + 1));
+    if (!keep)
+      return make_error(Errc::invalid_argument, "--keep " + word + ": must be field, centre, or SITE=field");
+    if (equals == std::string::npos)
+      out.everywhere = *keep;
+    else
+      out.by_site[word.substr(0, equals)] = *keep;
+  }
+  return out;
+}
+
+unsigned long long n(std::uint64_t value) { return value; }
+
+void print(const sync::Conflict& conflict) {
+  const std::string site = conflict.site_id.empty() ? "anchors without a site"
+                                                    : conflict.site_name + " (" + conflict.site_id + ")";
+  std::printf("CONFLICT %s\n", printable(site).c_str());
+  for (const auto& anchor : conflict.anchors) {
+    std::printf("  %s\n    field   %s\n    centre  %s\n", printable(anchor.network_id).c_str(),
+                printable(anchor.field).c_str(), printable(anchor.centre).c_str());
+    if (anchor.distance_m) std::printf("    apart   %.3f m\n", *anchor.distance_m);
+  }
+}
+
+void print(const sync::Outcome& o, bool dry_run) {
+  if (!dry_run)
+    std::printf(
+        "flights: %llu sent, %llu there already, %llu not finished\nmodels: %llu sent, %llu there already\n"
+        "anchors: %llu published, %llu there already, %llu left as they are there\n",
+        n(o.flights_sent), n(o.flights_there), n(o.flights_recording), n(o.models_sent), n(o.models_there),
+        n(o.anchors_published), n(o.anchors_there), n(o.anchors_left));
+  for (const auto& conflict : o.undecided) print(conflict);
+  if (!o.undecided.empty())
+    std::printf(
+        "Both sides published these: decide by --keep 'SITE=field' or --keep 'SITE=centre' (name or id), or "
+        "by --keep field|centre for all\n");
+  for (const auto& one : o.failed) std::printf("FAILED %s\n", printable(one).c_str());
+}
+
+Result<std::string> field_token(const Options& options) {
+  if (!options.url_token_file.empty()) return read_token_file(options.url_token_file);
+  return folder_token(options.data_dir);
+}
+
+Result<sync::Outcome> run(const Options& options, const sync::Decisions& decisions) {
+  const auto local = options.url.empty() ? running_server(options.data_dir) : std::optional(options.url);
+  if (!local)
+    return make_error(Errc::not_found, "no server runs in " + options.data_dir +
+                                           ": start anchord serve there, or name the field server by --url");
+  sync::PeerOptions peer;
+  peer.give_up = std::chrono::seconds(options.wait_s);
+  peer.report = [](const std::string& line) { std::fprintf(stderr, "%s\n", printable(line).c_str()); };
+  peer.url = *local;
+  peer.token_option = "--url-token-file";
+  BOOST_OUTCOME_TRY(peer.token, field_token(options));
+  BOOST_OUTCOME_TRY(const auto field, sync::Peer::to(peer));
+  peer.url = options.to;
+  peer.token_option = "--token-file";
+  BOOST_OUTCOME_TRY(peer.token, read_token_file(options.token_file));
+  BOOST_OUTCOME_TRY(const auto centre, sync::Peer::to(peer));
+  sync::SyncOptions how;
+  how.dry_run = options.dry_run;
+  how.decisions = decisions;
+  how.state_file = std::filesystem::path(options.data_dir) / "sync.json";
+  how.report = peer.report;
+  return sync::sync_up(*field, *centre, how);
+}
+
+int sync_command(const Options& options) {
+  const auto decisions = decisions_of(options.keep);
+  if (!decisions) return fail(decisions.error().message, 2);
+  const auto outcome = run(options, decisions.value());
+  if (!outcome) {
+    const bool input = outcome.error().code == Errc::invalid_argument;
+    return fail(outcome.error().message + (input ? "" : "; what has arrived stays, run it again to go on"),
+                input ? 2 : 1);
+  }
+  print(outcome.value(), options.dry_run);
+  if (!outcome.value().failed.empty()) return 1;
+  return outcome.value().undecided.empty() ? 0 : k_undecided;
+}
+
+}  // namespace
+
+void add_sync_command(CLI::App& app, int& exit_code) {
+  auto* command = app.add_subcommand(
+      "sync", "Send finished flights, models and published positions of a running server to another");
+  const auto options = std::make_shared<Options>();
+  command->add_option("--to", options->to, "address of the centre, like https://centre.example")->required();
+  command->add_option("--token-file", options->token_file,
+                      "file with an access token of the centre (role engineer); else ANCHORD_TOKEN");
+  command
+      ->add_option("--data-dir", options->data_dir, "folder of the field server, which runs [anchord-data]")
+      ->envname("ANCHORD_DATA_DIR");
+  command->add_option("--url", options->url, "address of the field server; else that of its folder");
+  command->add_option("--url-token-file", options->url_token_file,
+                      "file with an access token of the field server; else the admin token of its folder");
+  command
+      ->add_option("--keep", options->keep,
+                   "where both published: field or centre, or of one site SITE=field; may be repeated")
+      ->allow_extra_args(false);
+  command->add_option("--wait", options->wait_s, "seconds to wait for a server that does not answer [60]")
+      ->check(CLI::Range(1, 86'400));
+  command->add_flag("--dry-run", options->dry_run, "show what would go, send nothing");
+  command->callback([&exit_code, options] { exit_code = sync_command(*options); });
+}
+
+}  // namespace anchord::cli

@@ -1,0 +1,129 @@
+#include "server/sync/peer.hpp"
+
+#include <nlohmann/json.hpp>
+#include <random>
+#include <thread>
+
+#include "api/kit/support.hpp"
+#include "api/measurements/flight_requests.hpp"
+#include "core/base/text.hpp"
+#include "core/base/time.hpp"
+#include "server/gateway/answer.hpp"
+
+namespace anchord::sync {
+namespace {
+
+using Json = nlohmann::json;
+using std::chrono::milliseconds;
+using Monotonic = std::chrono::steady_clock;
+
+constexpr milliseconds k_answer_time{30'000};
+/// Five million rows, the most of a bundle, are taken in within some minutes.
+constexpr milliseconds k_bundle_answer_time{600'000};
+constexpr milliseconds k_first_pause{500}, k_longest_pause{15'000};
+constexpr int k_most_pages = 10'000;  ///< ten million items: more than any server has
+
+Errc errc_of(int status) {
+  if (status == 404 || status == 410) return Errc::not_found;
+  if (status == 409 || status == 412) return Errc::conflict;
+  return Errc::invalid_argument;
+}
+
+bool again_later(int status) { return status == 408 || status == 425 || status == 429 || status >= 500; }
+
+}  // namespace
+
+const Json& member(const Json& object, const char* key) {
+  static const Json none;
+  const auto at = object.find(key);
+  return at != object.end() ? *at : none;
+}
+
+std::string text_of(const Json& object, const char* key) {
+  const Json& value = member(object, key);
+  return value.is_string() ? value.get<std::string>() : std::string();
+}
+
+std::string in_words(const server::ClientResponse& answer) {
+  return std::to_string(answer.status) + " " + api::problem_text(answer.body);
+}
+
+Result<std::unique_ptr<Peer>> Peer::to(const PeerOptions& options) {
+  BOOST_OUTCOME_TRY(auto quick, server::HttpClient::to(options.url, k_answer_time));
+  BOOST_OUTCOME_TRY(auto slow, server::HttpClient::to(options.url, k_bundle_answer_time));
+  if (!options.token.empty()) {
+    quick.set_header("Authorization", "Bearer " + options.token);
+    slow.set_header("Authorization", "Bearer " + options.token);
+  }
+  return std::unique_ptr<Peer>(new Peer(options, std::move(quick), std::move(slow)));
+}
+
+Result<server::ClientResponse> Peer::call(const PeerRequest& request) {
+  static std::minstd_rand chance{std::random_device{}()};
+  gateway::Pauses pauses{k_first_pause, k_longest_pause};
+  const std::string what = options_.url + " " + std::string(request.method) + " " + request.target + ": ";
+  std::map<std::string, std::string> headers;
+  if (!request.idempotency_key.empty()) headers.emplace("Idempotency-Key", request.idempotency_key);
+  std::optional<Monotonic::time_point> away_since;
+  for (;;) {
+    const auto began = Monotonic::now();
+    auto answer = (request.bundle ? slow_ : quick_)
+                      .call(request.method, request.target, request.body, request.type, headers);
+    auto wait = pauses.next(std::uniform_real_distribution<double>(0, 1)(chance));
+    std::string why = answer ? what + in_words(answer.value()) : answer.error().message;
+    if (answer) {
+      const auto& a = answer.value();
+      if (a.status == 401 || a.status == 403)
+        return make_error(Errc::invalid_argument, why + "; " + options_.token_option +
+                                                      " names a file with a token of that server (engineer)");
+      if (a.status == 507)
+        return make_error(Errc::storage_full, why + "; the disk there is full: make room, then run it again");
+      if (!again_later(a.status)) return answer;
+      if (const auto header = a.headers.find("retry-after"); header != a.headers.end())
+        wait = std::max(wait, gateway::retry_after(header->second, SystemClock{}.now()).value_or(wait));
+    }
+    // A large bundle that was on its way for long had a link: only the time without one counts.
+    const auto now = Monotonic::now();
+    if (!away_since || now - began > options_.give_up) {
+      away_since = now;
+      options_.report(why + "; trying again for " + std::to_string(options_.give_up.count()) + " s");
+    }
+    if (now + wait > *away_since + options_.give_up) return make_error(Errc::link_lost, why);
+    std::this_thread::sleep_for(wait);
+  }
+}
+
+Error Peer::stranger(const std::string& target, const std::string& what) const {
+  return make_error(Errc::invalid_argument,
+                    options_.url + " " + target + ": " + what + ": is this the address of an anchord?");
+}
+
+Result<Json> Peer::get(const std::string& target) {
+  BOOST_OUTCOME_TRY(const auto answer, call({"GET", target}));
+  if (answer.status >= 300)
+    return make_error(errc_of(answer.status), options_.url + " GET " + target + ": " + in_words(answer));
+  auto json = Json::parse(answer.body, nullptr, false);
+  if (!json.is_object()) return stranger(target, "the answer is no JSON object");
+  return json;
+}
+
+Result<std::vector<Json>> Peer::list(const std::string& target) {
+  std::vector<Json> out;
+  const std::string first = target + (target.find('?') == std::string::npos ? "?" : "&") + "limit=1000";
+  std::string cursor;
+  for (int pages = 0; pages < k_most_pages; ++pages) {
+    BOOST_OUTCOME_TRY(const auto page,
+                      get(cursor.empty() ? first : first + "&cursor=" + api::percent_encoded(cursor)));
+    const Json& items = page.contains("items") ? page["items"] : member(page, "features");
+    if (!items.is_array()) return stranger(target, "the answer is no list");
+    for (const auto& item : items) {
+      if (!item.is_object()) return stranger(target, "an item of the list is no JSON object");
+      out.push_back(item);
+    }
+    cursor = text_of(page, "next_cursor");
+    if (cursor.empty()) return out;
+  }
+  return stranger(target, "the list has no end");
+}
+
+}  // namespace anchord::sync
