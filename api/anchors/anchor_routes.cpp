@@ -119,6 +119,7 @@ Response one(AnchorApi& s, const Request& request) {
   if (s.answers != nullptr) {
     if (auto kept = s.answers->find(request)) return *std::move(kept);
   }
+  (void)s.contradictions.standing();  // settled, or there is no state that the answer could be kept under
   const auto before = s.answers != nullptr ? s.answers->state() : std::nullopt;
   const AnchorFeature feature = feature_of(s, path_anchor(s, request));
   const std::string tag = etag(feature);
