@@ -24,6 +24,7 @@ struct AuthenticatorOptions {
   double rate_per_s{50}, rate_burst{200};
   TrustedProxies proxies{};
   WsPlaceLimits places{};
+  double slow_s{0};  ///< a request that takes longer is logged; 0: none
 };
 
 /// Between the transport and the application: who asks, from which page, how often, and which route answers.
@@ -48,6 +49,8 @@ class Authenticator final : public Gateway {
   Admission live_omlox(const api::Request& request, bool websocket, const api::Login& login);
   /// Whether this login stands; holds its place among the live connections for as long as it is kept.
   std::function<bool()> standing(const api::Login& login, std::shared_ptr<void> place);
+  /// Longer than it should have taken: not where the client asked to wait.
+  bool is_slow(const api::Request& request, double seconds) const;
   std::function<bool()> let_in(const api::Request& request, std::string_view token);
   Admission decide(api::Request& request, std::string_view host, bool websocket);
   api::Response run(const api::Route& route, api::Request& request, const api::Login& login);
