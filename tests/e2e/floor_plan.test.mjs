@@ -113,7 +113,7 @@ const sheet = `<svg xmlns="http://www.w3.org/2000/svg" width="420mm" height="297
   </g></svg>`;
 
 test('a PDF that Chromium printed is a plan: its second page, placed by three points, and the room of it traced', async () => {
-  const page = await browser.newPage();
+  const page = await browser.context.newPage();
   await page.setContent(
     `<style>@page{size:420mm 297mm;margin:0}body{margin:0}</style><p>Title</p><div style="break-before:page;position:relative;height:290mm">${sheet}</div>`,
   );
@@ -127,13 +127,11 @@ test('a PDF that Chromium printed is a plan: its second page, placed by three po
   const [building] = (await send('GET', '/api/v1/buildings')).json.items;
   const floor = await send('POST', '/api/v1/floors', { json: { building: building.id, name: 'Printed', level: 1 } });
   const path = `/api/v1/floors/${floor.json.id}/plan`;
-  const none = await server.fetch(`${path}?page=3`, { method: 'PUT', body: pdf, headers: { 'if-match': floor.etag } });
-  assert.equal(none.status, 422);
+  const one_page = { body: pdf, headers: { 'content-type': 'application/pdf', 'if-match': floor.etag } };
+  const none = await server.fetch(`${path}?page=3`, { method: 'PUT', ...one_page });
+  assert.equal(none.status, 422, await none.clone().text());
   assert.match(await none.text(), /has 2 pages and no page 3/);
-  const sent = await send('PUT', `${path}?page=2`, {
-    body: pdf,
-    headers: { 'content-type': 'application/pdf', 'if-match': floor.etag },
-  });
+  const sent = await send('PUT', `${path}?page=2`, one_page);
   const { width_px, height_px } = sent.json.plan;
   assert.ok(
     Math.abs(width_px - (420 / 25.4) * 200) < 3 && Math.abs(height_px - (297 / 25.4) * 200) < 3,
