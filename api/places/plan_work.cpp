@@ -83,7 +83,8 @@ Result<std::string> draw(std::span<const std::byte> dxf, const std::optional<Eig
 Result<std::string> page(std::string_view pdf, int number, double wanted_dpi, const RunProgram& run) {
   if (!run) return make_error(Errc::unsupported, "this program draws no PDF: export the page as PNG");
   const auto n = std::to_string(number);
-  BOOST_OUTCOME_TRY(const auto info, run({"pdfinfo", "-f", n, "-l", n, "-"}, pdf, 1 << 20));
+  // From the first page on: of a page that is not there alone pdfinfo prints not even how many there are.
+  BOOST_OUTCOME_TRY(const auto info, run({"pdfinfo", "-f", "1", "-l", n, "-"}, pdf, 4 << 20));
   BOOST_OUTCOME_TRY(const auto found, floor_plan::read_pdf_info(info, number));
   BOOST_OUTCOME_TRY(auto dpi, floor_plan::drawable_dpi(found, wanted_dpi));
   while (true) {

@@ -19,7 +19,7 @@ struct PdfPage {
   double width_pt{}, height_pt{};  ///< of the page as it is shown; 72 points are an inch of paper
 };
 
-/// Of what `pdfinfo -f PAGE -l PAGE` printed. errors: invalid_argument (no such page), bad_frame (no size)
+/// Of what `pdfinfo -f 1 -l PAGE` printed. errors: invalid_argument (no such page), bad_frame (no size)
 Result<PdfPage> read_pdf_info(std::string_view text, int page);
 
 /// Dots per inch to draw a page with: `wanted`, or less so that the picture is not larger than a plan may be.

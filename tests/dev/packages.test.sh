@@ -26,7 +26,7 @@ for package in $(listed "") $(listed @test) $(listed @bench) $(listed @lint) $(l
     [[ -n $used ]] ; pass_or_fail $? "no source includes a header of $package: take it out of .ci/packages"
   else
     used=
-    for program in $(grep -E '^/usr/s?bin/[^/]+$' <<<"$files" | sed 's|.*/||'); do
+    for program in $(grep -E '^(/usr)?/s?bin/[^/]+$' <<<"$files" | sed 's|.*/||'); do
       grep -rqwF --exclude-dir=node_modules --exclude-dir=build -e "$program" "${own[@]}" && { used=$program; break; }
     done
     # Neither headers nor programs: a library that is loaded by its name.

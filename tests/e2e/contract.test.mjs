@@ -92,8 +92,6 @@ test('a flight as one file, and back', async () => {
   await call('POST', '/api/v1/bundles', { expect: 415, json: {} });
   await call('GET', `/api/v1/missions/${ids.spare}/bundle`, { expect: 409 }); // it records
   await call('GET', `/api/v1/missions/${ids.mission}/handover`, { expect: 200 });
-  await call('GET', `/api/v1/missions/${ids.mission}/ranges.gpkg`, { expect: 200 });
-  await call('GET', `/api/v1/missions/${unknown}/ranges.gpkg`, { expect: 404 });
   await call('GET', '/api/v1/signing-key?format=pem', { expect: 200 });
 });
 

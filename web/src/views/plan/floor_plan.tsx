@@ -200,7 +200,11 @@ function NewFloor({
 function Sent({ held, busy, send }: { held: Held; busy: string; send: (file: File) => void }) {
   return (
     <label class="btn">
-      {busy === 'send' ? 'Sending' : held.floor.plan ? 'Replace the plan' : 'Send a plan (PNG, JPEG, GeoTIFF, PDF, DXF)'}
+      {busy === 'send'
+        ? 'Sending'
+        : held.floor.plan
+          ? 'Replace the plan'
+          : 'Send a plan (PNG, JPEG, GeoTIFF, PDF, DXF)'}
       <input
         type="file"
         accept=".png,.jpg,.jpeg,.tif,.tiff,.pdf,.dxf"
