@@ -80,12 +80,21 @@ Result<std::string> draw(std::span<const std::byte> dxf, const std::optional<Eig
       {"drawing_m_from_pixel", {by * m(0, 0), by * m(0, 1), m(0, 2), by * m(1, 0), by * m(1, 1), m(1, 2)}}});
 }
 
+/// The error of a program of poppler, with what to do about it.
+Error advised(Error error) {
+  if (error.code == Errc::unsupported)
+    error.message += ": install poppler-utils there, or export the page as PNG";
+  if (error.code == Errc::bad_frame) error.message += ": export the PDF again, without a password";
+  return error;
+}
+
 Result<std::string> page(std::string_view pdf, int number, double wanted_dpi, const RunProgram& run) {
   if (!run) return make_error(Errc::unsupported, "this program draws no PDF: export the page as PNG");
   const auto n = std::to_string(number);
   // From the first page on: of a page that is not there alone pdfinfo prints not even how many there are.
-  BOOST_OUTCOME_TRY(const auto info, run({"pdfinfo", "-f", "1", "-l", n, "-"}, pdf, 4 << 20));
-  BOOST_OUTCOME_TRY(const auto found, floor_plan::read_pdf_info(info, number));
+  const auto info = run({"pdfinfo", "-f", "1", "-l", n, "-"}, pdf, 4 << 20);
+  if (!info) return advised(info.error());
+  BOOST_OUTCOME_TRY(const auto found, floor_plan::read_pdf_info(info.value(), number));
   BOOST_OUTCOME_TRY(auto dpi, floor_plan::drawable_dpi(found, wanted_dpi));
   while (true) {
     const auto png =
@@ -93,7 +102,7 @@ Result<std::string> page(std::string_view pdf, int number, double wanted_dpi, co
             floor_plan::k_max_image_bytes);
     if (png) return to_wire(Json{{"png", base64(png.value())}, {"pages", found.pages}});
     // Too many bytes for a plan: coarser.
-    if (png.error().code != Errc::invalid_argument || dpi < k_min_plan_dpi) return png.error();
+    if (png.error().code != Errc::invalid_argument || dpi < k_min_plan_dpi) return advised(png.error());
     dpi /= 2;
   }
 }

@@ -196,6 +196,7 @@ TEST_F(WorkerProcess, DrawsAPageOfAPdfByPopplerAndRefusesWhatIsNone) {
   ASSERT_FALSE(broken);
   EXPECT_EQ(broken.error().code, Errc::bad_frame);
   EXPECT_NE(broken.error().message.find("pdfinfo failed"), std::string::npos) << broken.error().message;
+  EXPECT_NE(broken.error().message.find("export the PDF again"), std::string::npos) << broken.error().message;
 }
 
 TEST_F(WorkerProcess, APageWithoutItsMarkRunsNoProgram) {
