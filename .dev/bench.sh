@@ -5,10 +5,11 @@ cmd_bench() {
   install_packages test bench
   ensure_node
   ensure_test_packages
-  if [[ ${1:-} == soak ]]; then
+  if [[ ${1:-} == soak || ${1:-} == exports ]]; then
+    local what=$1
     shift
     build_preset release anchord
-    ANCHORD_BINARY=$PWD/$build_dir/anchord node tests/bench/soak.mjs "$@" || die "the soak found something: see its table above"
+    ANCHORD_BINARY=$PWD/$build_dir/anchord node "tests/bench/$what.mjs" "$@" || die "$what found something: see its table above"
     return
   fi
   build_preset bench

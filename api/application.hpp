@@ -21,6 +21,7 @@
 #include "core/base/steady.hpp"
 #include "core/geo/track_segments.hpp"
 #include "core/localize/accuracy_goal.hpp"
+#include "core/ports/feature_file.hpp"
 #include "core/ports/stores.hpp"
 #include "core/types/feature_table.hpp"
 
@@ -89,6 +90,11 @@ class Application {
     /// The bytes of a GeoPackage; unset: there is nobody who writes one.
     std::function<Result<std::string>(std::span<const FeatureTable>, UtcTime)> geopackage =
         [](std::span<const FeatureTable>, UtcTime) -> Result<std::string> {
+      return Error{Errc::unsupported, "this program writes no GeoPackage"};
+    };
+    /// The same on the disk, for many rows.
+    MakeFeatureFile feature_file = [](const std::filesystem::path&, const FeatureTable&,
+                                      UtcTime) -> Result<std::unique_ptr<FeatureFile>> {
       return Error{Errc::unsupported, "this program writes no GeoPackage"};
     };
     /// Where bundles are made and uploads of them wait; emptied by whoever owns it.

@@ -113,7 +113,7 @@ set(server/mqtt_source "^(mosquitto\\.h$|poll\\.h$|resolv\\.h$|sys/|unistd\\.h$)
 
 # Of JSON only its name, as in api.
 set(server_header "^(${everywhere}|boost/|nlohmann/json_fwd\\.hpp$)")
-set(server_source "^(CLI/|linux/(filter|seccomp)\\.h$|spawn\\.h$|httplib\\.h$|spdlog/|fmt/|prometheus/|openssl/|toml\\+\\+/|toml\\.hpp$|nlohmann/json|zlib\\.h$|sys/|netdb\\.h$|netinet/|arpa/|unistd\\.h$|fcntl\\.h$|signal\\.h$|poll\\.h$|pthread\\.h$|termios\\.h$)")
+set(server_source "^(CLI/|linux/(filter|landlock|seccomp)\\.h$|spawn\\.h$|httplib\\.h$|spdlog/|fmt/|prometheus/|openssl/|toml\\+\\+/|toml\\.hpp$|nlohmann/json|zlib\\.h$|sys/|netdb\\.h$|netinet/|arpa/|unistd\\.h$|fcntl\\.h$|signal\\.h$|poll\\.h$|pthread\\.h$|termios\\.h$)")
 
 set(migrations_header "^$")
 set(migrations_source "^$")
@@ -146,7 +146,7 @@ set(mutexes
   api/devices/device_stream.hpp:changing_         # whose the devices are: told to them and to the disk
   api/learning/model_registry.hpp:reloading_      # the promoted models
   api/missions/mission_service_state.hpp:reading_one  # a flight read back from the store
-  api/webhooks/webhook_service.hpp:starting_      # the thread of webhooks: begun or joined
+  api/webhooks/webhook_service.hpp:starting_      # the threads of webhooks: begun or joined
   server/runtime/backup_keeper.hpp:making_        # a backup
   server/runtime/device_manager.cpp:saving_       # devices.json
   server/runtime/worker_main.cpp:writing          # a frame to the server

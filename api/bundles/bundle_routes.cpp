@@ -3,6 +3,7 @@
 #include <nlohmann/json.hpp>
 
 #include "api/bundles/bundle_file.hpp"
+#include "api/bundles/range_table.hpp"
 #include "api/bundles/routes.hpp"
 #include "api/bundles/spool.hpp"
 #include "api/kit/reader.hpp"
@@ -20,6 +21,16 @@ Response bundle(BundleApi& s, const Request& request) {
   auto folder = value_or_problem(SpoolFolder::make(s.spool));
   const auto file = value_or_problem(make_bundle(s, mission, request.principal, *folder));
   return file_answer(std::move(folder), file, k_bundle_type, "mission-" + to_string(mission.id) + ".anchord");
+}
+
+Response ranges_file(BundleApi& s, const Request& request) {
+  check_query(request, {});
+  const Mission mission = s.named(request);
+  auto folder = value_or_problem(SpoolFolder::make(s.spool));
+  const auto file = folder->path("ranges.gpkg");
+  value_or_problem(write_ranges(s.measurements, mission.id, s.feature_file, file, s.clock.now()));
+  return file_answer(std::move(folder), file, "application/geopackage+sqlite3",
+                     "ranges-" + to_string(mission.id) + ".gpkg");
 }
 
 /// What is wrong with a file of a stranger is the file's fault: 422, with what to do.
@@ -100,6 +111,8 @@ Response take(BundleApi& s, const Request& request) {
 void add_bundle_routes(Router& router, BundleApi& s) {
   router.add(as_heavy({Method::get, "/api/v1/missions/{id}/bundle", readers(),
                        [&s](const Request& request) { return bundle(s, request); }}));
+  router.add(as_heavy({Method::get, "/api/v1/missions/{id}/ranges.gpkg", readers(),
+                       [&s](const Request& request) { return ranges_file(s, request); }}));
   router.add({Method::post, "/api/v1/bundles", Access::any_of({Role::engineer}),
               [&s](const Request& request) { return take(s, request); }, k_bundle_bytes, true});
 }

@@ -7,6 +7,7 @@
 
 #include "api/kit/audit.hpp"
 #include "core/base/ids.hpp"
+#include "core/ports/feature_file.hpp"
 #include "core/types/mission.hpp"
 
 namespace anchord {
@@ -14,6 +15,7 @@ class BundleStore;
 class CalibrationStore;
 class Clock;
 class Ed25519Key;
+class MeasurementStore;
 class RevisionStore;
 }  // namespace anchord
 
@@ -46,9 +48,11 @@ struct BundleApi {
   const Ed25519Key& key;  ///< what hand-over packs are signed with
   /// The server's own answer to a request, for the files of a hand-over pack.
   std::function<Response(Request&)> ask;
+  MeasurementStore& measurements;
+  MakeFeatureFile feature_file;
 };
 
-/// GET /api/v1/missions/{id}/bundle and POST /api/v1/bundles.
+/// GET /api/v1/missions/{id}/bundle, GET /api/v1/missions/{id}/ranges.gpkg and POST /api/v1/bundles.
 void add_bundle_routes(Router& router, BundleApi& api);
 /// GET /api/v1/missions/{id}/handover and GET /api/v1/signing-key.
 void add_handover_routes(Router& router, BundleApi& api);

@@ -99,13 +99,22 @@ Result<HubSender::Sent> OmloxPush::send_providers(const Webhook& hub, const Orde
   Sent last{204, ""};
   for (const auto& one : providers) {
     const auto key = made_key(hub, one["id"].get<std::string>());
-    if (made_.contains(key)) continue;
+    {
+      const auto made = made_.lock();
+      if (made->contains(key)) continue;
+    }
     BOOST_OUTCOME_TRY(last, make_or_change(hub, "/providers", one));
     if (!last.fault.empty()) return last;
-    if (made_.size() >= k_most_made) made_.clear();
-    made_.insert(key);
+    auto made = made_.lock();
+    if (made->size() >= k_most_made) made->clear();
+    made->insert(key);
   }
   return last;
+}
+
+void OmloxPush::forget(const Webhook& hub, const Ordered& providers) {
+  auto made = made_.lock();
+  for (const auto& one : providers) made->erase(made_key(hub, one["id"].get<std::string>()));
 }
 
 Result<HubSender::Sent> OmloxPush::send_zones(const Webhook& hub) {
@@ -125,7 +134,7 @@ Result<HubSender::Sent> OmloxPush::send_zones(const Webhook& hub) {
     if (providers.size() < k_most_providers) providers.push_back(omlox_provider_json(one));
   }
   // Once more, although they were made: who asks for everything gets everything.
-  for (const auto& one : providers) made_.erase(made_key(hub, one["id"].get<std::string>()));
+  forget(hub, providers);
   if (!providers.empty()) {
     BOOST_OUTCOME_TRY(last, send_providers(hub, providers));
   }
@@ -153,9 +162,7 @@ Result<HubSender::Sent> OmloxPush::send_locations(const Webhook& hub, const std:
   const char* method = hub.dialect == OmloxDialect::objects ? "POST" : "PUT";
   BOOST_OUTCOME_TRY(const auto reply, ask(hub, method, "/providers/locations", body));
   // It has forgotten them, perhaps: they are made anew the next time.
-  if (!reply.good()) {
-    for (const auto& one : providers) made_.erase(made_key(hub, one["id"].get<std::string>()));
-  }
+  if (!reply.good()) forget(hub, providers);
   return reply.sent();
 }
 

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "api/webhooks/webhook_service.hpp"
+#include "core/base/locked.hpp"
 
 namespace anchord {
 class PlaceStore;
@@ -17,7 +18,7 @@ class OmloxLocations;
 
 /// Makes and changes what a hub has of this server: zones and providers one by one, locations together.
 /// Zones are found again by their id, or, since hubs of the official dialect give ids of their own, by the id
-/// in properties.anchord. On the thread of webhooks.
+/// in properties.anchord. On the threads of webhooks.
 class OmloxPush final : public HubSender {
  public:
   struct Deps {
@@ -47,9 +48,11 @@ class OmloxPush final : public HubSender {
   /// Under which id a hub keeps our zone; empty: it has none.
   Result<std::string> kept_as(const Webhook& hub, const nlohmann::ordered_json& zone, Reply& reply);
   Result<Sent> send_providers(const Webhook& hub, const nlohmann::ordered_json& providers);
+  /// Has them made anew the next time.
+  void forget(const Webhook& hub, const nlohmann::ordered_json& providers);
 
   Deps deps_;
-  std::set<std::string> made_;  ///< providers, by hub and its version
+  Locked<std::set<std::string>> made_;  ///< providers, by hub and its version
 };
 
 }  // namespace anchord::api

@@ -13,6 +13,7 @@
 #include "core/base/to_wire.hpp"
 #include "core/floor_plan/dxf.hpp"
 #include "core/floor_plan/image_head.hpp"
+#include "core/floor_plan/pdf.hpp"
 #include "core/ports/place_store.hpp"
 #include "core/ports/site_store.hpp"
 #include "core/types/anchor.hpp"
@@ -152,8 +153,17 @@ std::optional<floor_plan::GeoTags> tags_of_drawing(const Json& drawn, const Site
   return tags;
 }
 
+/// The page of a PDF that is asked for, as a picture.
+std::string page_of(PlaceApi& s, const Request& request, const std::string& pdf) {
+  PlanQuestion question;
+  question.task = PlanTask::page;
+  question.page = static_cast<int>(query_number(request, "page", 1, 9999).value_or(1));
+  question.dots_per_inch = query_number(request, "dpi", k_min_plan_dpi, k_max_plan_dpi).value_or(k_plan_dpi);
+  return png_of(worked(s, question, pdf));
+}
+
 Response put_plan(PlaceApi& s, const Request& request) {
-  check_query(request, {});
+  check_query(request, {"page", "dpi"});
   Floor floor = path_floor(s, request);
   require_match(request, etag(floor));
   const Site site = site_of(s, floor);
@@ -163,6 +173,8 @@ Response put_plan(PlaceApi& s, const Request& request) {
   if (floor_plan::is_dxf(std::as_bytes(std::span(picture)))) {
     drawn = worked(s, {PlanTask::draw, {}, on_map_m(site)}, picture);
     picture = png_of(*drawn);
+  } else if (floor_plan::is_pdf(std::as_bytes(std::span(picture)))) {
+    picture = page_of(s, request, picture);
   }
   const auto head = head_of(picture);
   const Json seen = worked(s, {PlanTask::inspect}, picture);

@@ -10,6 +10,7 @@
 #include "core/floor_plan/backdrop.hpp"
 #include "core/floor_plan/draw.hpp"
 #include "core/floor_plan/image_head.hpp"
+#include "core/floor_plan/pdf.hpp"
 #include "core/floor_plan/trace.hpp"
 
 namespace anchord::api {
@@ -22,7 +23,10 @@ constexpr std::string_view k_mark = "floor_plan ";
 constexpr auto k_task_words = enum_table<PlanTask>({{"inspect", PlanTask::inspect},
                                                     {"backdrop", PlanTask::backdrop},
                                                     {"trace", PlanTask::trace},
-                                                    {"draw", PlanTask::draw}});
+                                                    {"draw", PlanTask::draw},
+                                                    {"page", PlanTask::page}});
+/// The head of a message that needs a program begins so.
+constexpr std::string_view k_page_mark = "floor_plan page ";
 
 Json pair_json(const Eigen::Vector2d& m) { return {m.x(), m.y()}; }
 
@@ -76,16 +80,45 @@ Result<std::string> draw(std::span<const std::byte> dxf, const std::optional<Eig
       {"drawing_m_from_pixel", {by * m(0, 0), by * m(0, 1), m(0, 2), by * m(1, 0), by * m(1, 1), m(1, 2)}}});
 }
 
+/// The error of a program of poppler, with what to do about it.
+Error advised(Error error) {
+  if (error.code == Errc::unsupported)
+    error.message += ": install poppler-utils there, or export the page as PNG";
+  if (error.code == Errc::bad_frame) error.message += ": export the PDF again, without a password";
+  return error;
+}
+
+Result<std::string> page(std::string_view pdf, int number, double wanted_dpi, const RunProgram& run) {
+  if (!run) return make_error(Errc::unsupported, "this program draws no PDF: export the page as PNG");
+  const auto n = std::to_string(number);
+  // From the first page on: of a page that is not there alone pdfinfo prints not even how many there are.
+  const auto info = run({"pdfinfo", "-f", "1", "-l", n, "-"}, pdf, 4 << 20);
+  if (!info) return advised(info.error());
+  BOOST_OUTCOME_TRY(const auto found, floor_plan::read_pdf_info(info.value(), number));
+  BOOST_OUTCOME_TRY(auto dpi, floor_plan::drawable_dpi(found, wanted_dpi));
+  while (true) {
+    const auto png =
+        run({"pdftoppm", "-png", "-singlefile", "-f", n, "-l", n, "-r", std::to_string(dpi), "-"}, pdf,
+            floor_plan::k_max_image_bytes);
+    if (png) return to_wire(Json{{"png", base64(png.value())}, {"pages", found.pages}});
+    // Too many bytes for a plan: coarser.
+    if (png.error().code != Errc::invalid_argument || dpi < k_min_plan_dpi) return advised(png.error());
+    dpi /= 2;
+  }
+}
+
 }  // namespace
 
 bool is_plan_work(std::string_view message) { return message.starts_with(k_mark); }
+bool is_page_work(std::string_view message) { return message.starts_with(k_page_mark); }
 
 Result<std::string> do_plan_work(std::string_view message, const std::stop_token& stop,
-                                 const WorkProgressSink& progress) {
+                                 const WorkProgressSink& progress, const RunProgram& run_program) {
   const auto line_end = message.find('\n');
   if (!is_plan_work(message) || line_end == std::string_view::npos)
     return make_error(Errc::bad_frame, "no work on a plan");
-  const auto head = Json::parse(message.substr(k_mark.size(), line_end - k_mark.size()), nullptr, false);
+  const auto mark = is_page_work(message) ? k_page_mark.size() : k_mark.size();
+  const auto head = Json::parse(message.substr(mark, line_end - mark), nullptr, false);
   const auto bytes = message.substr(line_end + 1);
   try {
     BOOST_OUTCOME_TRY(const auto task, k_task_words.parse("task", head.at("task").get<std::string>()));
@@ -100,6 +133,9 @@ Result<std::string> do_plan_work(std::string_view message, const std::stop_token
         site_map_m.emplace(at->at(0).get<double>(), at->at(1).get<double>());
       return draw(std::as_bytes(std::span(bytes)), site_map_m);
     }
+    if (task == PlanTask::page)
+      return page(bytes, head.at("page").get<int>(), head.at("dots_per_inch").get<double>(),
+                  is_page_work(message) ? run_program : RunProgram{});
     BOOST_OUTCOME_TRY(auto image, floor_plan::decode_image(std::as_bytes(std::span(bytes))));
     switch (task) {
       case PlanTask::inspect:
@@ -109,6 +145,7 @@ Result<std::string> do_plan_work(std::string_view message, const std::stop_token
       case PlanTask::trace:
         return trace(image, transform, stop, progress);
       case PlanTask::draw:
+      case PlanTask::page:
         break;
     }
   } catch (const Json::exception& fault) {
@@ -120,10 +157,12 @@ Result<std::string> do_plan_work(std::string_view message, const std::stop_token
 Result<std::string> plan_work_inline(const std::string& message, const WorkProgressSink& progress,
                                      const std::function<bool()>& canceled) {
   std::stop_source stop;
-  return do_plan_work(message, stop.get_token(), [&](const WorkProgress& p) {
-    if (canceled()) stop.request_stop();
-    if (progress) progress(p);
-  });
+  return do_plan_work(message, stop.get_token(),
+                      [&](const WorkProgress& p) {
+                        if (canceled()) stop.request_stop();
+                        if (progress) progress(p);
+                      },
+                      {});
 }
 
 Result<Json> ask_worker(const RunWork& run, const SteadyClock& steady, const PlanQuestion& question,
@@ -134,7 +173,12 @@ Result<Json> ask_worker(const RunWork& run, const SteadyClock& steady, const Pla
   Json head{{"task", k_task_words.word(question.task)},
             {"enu_from_pixel", {m(0, 0), m(0, 1), shift.x(), m(1, 0), m(1, 1), shift.y()}}};
   if (question.site_map_m) head["site_map_m"] = pair_json(*question.site_map_m);
-  std::string message = std::string(k_mark) + to_wire(head) + '\n';
+  if (question.task == PlanTask::page) {
+    head["page"] = question.page;
+    head["dots_per_inch"] = question.dots_per_inch;
+  }
+  std::string message =
+      std::string(question.task == PlanTask::page ? k_page_mark : k_mark) + to_wire(head) + '\n';
   message.append(picture);
   const auto begun = steady.now();
   bool late = false;

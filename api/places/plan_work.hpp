@@ -1,10 +1,14 @@
 #pragma once
 
+#include <cstddef>
+#include <functional>
 #include <nlohmann/json_fwd.hpp>
 #include <optional>
+#include <span>
 #include <stop_token>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "api/learning/worker_port.hpp"
 #include "core/floor_plan/georeference.hpp"
@@ -16,18 +20,24 @@ class SteadyClock;
 /// Work on pictures of plans in the worker process: a line of JSON with the task, then the picture's bytes.
 namespace anchord::api {
 
+/// Dots per inch that a PDF page is drawn with: a wall of 10 cm at 1:200 is 4 pixels thick.
+inline constexpr double k_plan_dpi = 200, k_min_plan_dpi = 50, k_max_plan_dpi = 600;
+
 /// What is asked of the worker.
 enum class PlanTask : std::uint8_t {
   inspect,   ///< {width_px, height_px, preview}: decoded whole once, so that a broken file is refused at once
   backdrop,  ///< {low_m, high_m, width_px, height_px, png}
   trace,     ///< {outline_m, walls, cell_m, notes}
   draw,      ///< {png, drawing_m_from_pixel, is_at_site}: of a DXF
+  page,      ///< {png, pages}: of a PDF
 };
 
 struct PlanQuestion {
   PlanTask task{PlanTask::inspect};
   floor_plan::PlanTransform transform{};        ///< backdrop, trace
   std::optional<Eigen::Vector2d> site_map_m{};  ///< draw: easting and northing of the site in its map system
+  int page{1};                                  ///< page
+  double dots_per_inch{k_plan_dpi};             ///< page: of paper, at most
 };
 
 /// The longest side of previews, and the most bytes of previews and backdrops.
@@ -36,13 +46,21 @@ inline constexpr std::size_t k_max_picture_bytes = std::size_t{8} << 20;
 /// A picture that keeps a decoder longer was made for that.
 inline constexpr double k_plan_work_s = 120;
 
+/// Runs a program, with these bytes as its standard input: what it printed.
+/// errors: unsupported (it is not installed), bad_frame (it failed, with its words), invalid_argument (it
+/// printed more than max_output)
+using RunProgram = std::function<Result<std::string>(const std::vector<std::string>& command,
+                                                     std::string_view input, std::size_t max_output)>;
+
 /// Whether a message is one of these; else it is do_work's.
 bool is_plan_work(std::string_view message);
+/// Whether it is one that needs a program (task page).
+bool is_page_work(std::string_view message);
 /// Does it, on the calling thread. errors: those of decode_image, make_backdrop, trace_plan, read_dxf,
-/// draw_plan; bad_frame
+/// draw_plan, read_pdf_info, RunProgram; bad_frame
 Result<std::string> do_plan_work(std::string_view message, const std::stop_token& stop,
-                                 const WorkProgressSink& progress);
-/// do_plan_work on the calling thread, as a RunWork.
+                                 const WorkProgressSink& progress, const RunProgram& run_program);
+/// do_plan_work on the calling thread, as a RunWork; without programs.
 Result<std::string> plan_work_inline(const std::string& message, const WorkProgressSink& progress,
                                      const std::function<bool()>& canceled);
 

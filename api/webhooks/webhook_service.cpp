@@ -17,13 +17,17 @@ constexpr std::int64_t k_idle_ns = 3600 * k_second_ns;
 constexpr std::int64_t k_live_ns = k_second_ns;  ///< from one live location to the next
 constexpr int k_most_doublings = 6;              ///< of that, while a hub takes none: 64 s
 
+bool takes_locations(const Webhook& webhook) {
+  return webhook.kind == WebhookKind::omlox_hub &&
+         std::ranges::find(webhook.events, k_location_event) != webhook.events.end();
+}
+
 }  // namespace
 
 void WebhookService::changed() {
   const std::lock_guard only(starting_);
   if (deps_.post == nullptr) return;
   auto all = deps_.store.webhooks();
-  bool begin = false;
   {
     auto state = state_.lock();
     if (state->stopped) return;
@@ -31,14 +35,38 @@ void WebhookService::changed() {
       state->enabled = std::move(all).value();
       std::erase_if(state->enabled, [](const Webhook& w) { return !w.enabled; });
     }
-    state->look = true;
-    begin = !state->enabled.empty() && !state->running;
-    if (begin) state->running = true;
+    ++state->news;
   }
   wake_.notify_all();
-  if (!begin) return;
-  if (thread_.joinable()) thread_.join();  // it ended by itself, when there was nobody to notify
-  thread_ = Thread("anchord-hook", [this] { run(); });
+  begin_threads();
+}
+
+void WebhookService::begin_threads() {
+  bool begin = false;
+  std::set<WebhookId> missing, sending;
+  {
+    auto state = state_.lock();
+    begin = !state->enabled.empty() && !state->running;
+    if (begin) state->running = true;
+    for (const auto& one : state->enabled) {
+      if (state->sending.insert(one.id).second) missing.insert(one.id);
+    }
+    sending = state->sending;
+  }
+  if (begin) {
+    if (thread_.joinable()) thread_.join();  // it ended by itself, when there was nobody to notify
+    thread_ = Thread("anchord-hook", [this] { run(); });
+  }
+  // Those that are not among the sending have ended by themselves.
+  std::erase_if(lanes_, [&](auto& one) {
+    if (sending.contains(one.first) && !missing.contains(one.first)) return false;
+    one.second->thread.join();
+    return true;
+  });
+  for (const auto& id : missing) {
+    const auto& lane = lanes_.emplace(id, std::make_unique<Lane>()).first->second;
+    lane->thread = Thread("anchord-send", [this, id, &own = *lane] { run_lane(id, own); });
+  }
 }
 
 void WebhookService::stop() {
@@ -50,7 +78,9 @@ void WebhookService::stop() {
   if (deps_.post != nullptr) deps_.post->stop();
   wake_.notify_all();
   if (thread_.joinable()) thread_.join();
+  for (const auto& [id, lane] : lanes_) lane->thread.join();
   (void)guarded("locations that were not sent", [this] { keep_unsent(); });
+  lanes_.clear();
   std::vector<WebhookDelivery> left;
   {
     auto state = state_.lock();
@@ -65,6 +95,14 @@ bool WebhookService::ended() {
   if (!state->stopped && !state->enabled.empty()) return false;
   state->running = false;
   return true;
+}
+
+std::optional<WebhookService::Turn> WebhookService::turn_of(const WebhookId& id) {
+  auto state = state_.lock();
+  const auto at = std::ranges::find(state->enabled, id, &Webhook::id);
+  if (!state->stopped && at != state->enabled.end()) return Turn{*at, state->news};
+  state->sending.erase(id);
+  return std::nullopt;
 }
 
 WebhookDelivery WebhookService::delivery(const Webhook& webhook, const LiveEvent& event) const {
@@ -102,7 +140,7 @@ Result<WebhookDelivery> WebhookService::test(const Webhook& webhook) {
   BOOST_OUTCOME_TRY(deps_.store.add({made}));
   {
     auto state = state_.lock();
-    state->look = true;
+    ++state->news;
   }
   wake_.notify_all();
   return made;
@@ -110,40 +148,53 @@ Result<WebhookDelivery> WebhookService::test(const Webhook& webhook) {
 
 void WebhookService::run() {
   while (!ended()) {
-    std::int64_t wait_ns = k_store_pause_ns;
-    (void)guarded("webhooks", [&] { wait_ns = round(); });
-    const bool paused = wait_ns == k_store_pause_ns;
-    (void)guarded("locations to hubs", [&] { wait_ns = std::min(wait_ns, live_round()); });
+    bool all = false;
+    (void)guarded("events to the outbox", [&] { all = store_fresh(); });
     auto state = state_.lock();
-    state.wait_for(wake_, std::chrono::nanoseconds(wait_ns),
-                   [&](const State& s) { return s.stopped || s.look || (!s.fresh.empty() && !paused); });
+    state.wait_for(wake_, std::chrono::nanoseconds(all ? k_idle_ns : k_store_pause_ns), [&](const State& s) {
+      return s.stopped || s.enabled.empty() || (all && !s.fresh.empty());
+    });
   }
 }
 
-std::int64_t WebhookService::round() {
+bool WebhookService::store_fresh() {
   std::vector<WebhookDelivery> fresh;
-  std::vector<Webhook> enabled;
   {
-    auto state = state_.lock();
-    state->look = false;
-    enabled = state->enabled;
+    const auto state = state_.lock();
     fresh.assign(state->fresh.begin(), state->fresh.end());
   }
-  if (!fresh.empty()) {
-    if (!deps_.store.add(fresh)) return k_store_pause_ns;  // they wait; new ones beyond the bound are counted
+  if (fresh.empty()) return true;
+  if (!deps_.store.add(fresh)) return false;  // they wait; new ones beyond the bound are counted
+  {
     auto state = state_.lock();
     state->fresh.erase(state->fresh.begin(),
                        state->fresh.begin() + static_cast<std::ptrdiff_t>(fresh.size()));
+    ++state->news;
   }
-  const auto pending = deps_.store.pending(16);
+  wake_.notify_all();
+  return true;
+}
+
+void WebhookService::run_lane(const WebhookId& id, Lane& lane) {
+  while (const auto turn = turn_of(id)) {
+    std::int64_t wait_ns = k_store_pause_ns;
+    (void)guarded("webhooks", [&] { wait_ns = round(turn->webhook, lane.hub); });
+    (void)guarded("locations to hubs",
+                  [&] { wait_ns = std::min(wait_ns, live_round(turn->webhook, lane.hub)); });
+    auto state = state_.lock();
+    state.wait_for(wake_, std::chrono::nanoseconds(wait_ns),
+                   [&](const State& s) { return s.stopped || s.news != turn->news; });
+  }
+}
+
+std::int64_t WebhookService::round(const Webhook& webhook, Hub& known) {
+  const auto pending = deps_.store.pending(webhook.id, 16);
   if (!pending) return k_store_pause_ns;
   for (const auto& one : pending.value()) {
     const auto now_ns = deps_.running_ns();
     if (one.due_ran_ns > now_ns) return std::min(one.due_ran_ns - now_ns, k_idle_ns);
     if (stopped()) return 0;
-    const auto to = std::ranges::find(enabled, one.webhook, &Webhook::id);
-    if (to == enabled.end()) return k_second_ns;  // it was added this moment: changed() is on its way
-    attempt(*to, one);
+    attempt(webhook, known, one);
   }
   return pending.value().empty() ? k_idle_ns : 0;
 }
@@ -175,20 +226,21 @@ WebhookService::Tried WebhookService::tried(const Result<HubSender::Sent>& sent)
 }
 
 /// What is published, or where the tag is, is read when it is sent: a hub that was away gets what holds now.
-WebhookService::Tried WebhookService::send_to_hub(const Webhook& hub, const WebhookDelivery& one) {
+WebhookService::Tried WebhookService::send_to_hub(const Webhook& hub, Hub& known,
+                                                  const WebhookDelivery& one) {
   if (deps_.hubs == nullptr) return {std::nullopt, "this server sends to no hub", false};
   if (one.event != k_location_event) return tried(deps_.hubs->send_zones(hub));
   auto body = deps_.hubs->newest_locations();
   if (body.empty()) body = one.body.text;  // of before a restart
   auto result = tried(deps_.hubs->send_locations(hub, body));
-  if (result.fault.empty()) hubs_[hub.id] = {body, "", 0, 0, hub.version};
+  if (result.fault.empty()) known = {body, "", 0, 0, hub.version};
   return result;
 }
 
-void WebhookService::attempt(const Webhook& webhook, WebhookDelivery one) {
+void WebhookService::attempt(const Webhook& webhook, Hub& known, WebhookDelivery one) {
   const UtcTime now = deps_.clock.now();
   const bool hub = webhook.kind == WebhookKind::omlox_hub;
-  auto result = hub ? send_to_hub(webhook, one) : send_event(webhook, one, now);
+  auto result = hub ? send_to_hub(webhook, known, one) : send_event(webhook, one, now);
   if (result.canceled) return;  // not tried: it is due after the next start
   ++one.attempts;
   one.tried = now;
@@ -208,39 +260,15 @@ void WebhookService::attempt(const Webhook& webhook, WebhookDelivery one) {
   (void)deps_.store.record(one).has_value();
 }
 
-std::vector<Webhook> WebhookService::live_hubs() const {
-  std::vector<Webhook> out;
-  const auto state = state_.lock();
-  for (const auto& one : state->enabled) {
-    if (one.kind == WebhookKind::omlox_hub &&
-        std::ranges::find(one.events, k_location_event) != one.events.end())
-      out.push_back(one);
-  }
-  return out;
-}
-
-std::int64_t WebhookService::live_round() {
-  if (deps_.hubs == nullptr) return k_idle_ns;
-  const auto hubs = live_hubs();
-  std::erase_if(hubs_, [&](const auto& known) {
-    return std::ranges::find(hubs, known.first, &Webhook::id) == hubs.end();
-  });
-  if (hubs.empty()) return k_idle_ns;
+std::int64_t WebhookService::live_round(const Webhook& hub, Hub& known) {
+  if (deps_.hubs == nullptr || !takes_locations(hub)) return k_idle_ns;
+  if (known.version != hub.version) known = {"", "", 0, 0, hub.version};  // perhaps another address
   const auto body = deps_.hubs->newest_locations();
-  std::int64_t wait_ns = k_live_ns;
-  for (const auto& hub : hubs) {
-    auto& known = hubs_[hub.id];
-    if (known.version != hub.version) known = {"", "", 0, 0, hub.version};  // perhaps another address
-    if (body.empty() || body == known.sent) continue;
-    const auto now_ns = deps_.running_ns();
-    if (known.due_ns > now_ns) {
-      wait_ns = std::min(wait_ns, known.due_ns - now_ns);
-      continue;
-    }
-    if (stopped()) break;
-    send_live(hub, known, body);
-  }
-  return wait_ns;
+  if (body.empty() || body == known.sent) return k_live_ns;
+  const auto now_ns = deps_.running_ns();
+  if (known.due_ns > now_ns) return std::min(k_live_ns, known.due_ns - now_ns);
+  if (!stopped()) send_live(hub, known, body);
+  return k_live_ns;
 }
 
 void WebhookService::send_live(const Webhook& hub, Hub& known, const std::string& body) {
@@ -286,9 +314,17 @@ void WebhookService::keep(const Webhook& hub, Hub& known, const std::string& bod
 void WebhookService::keep_unsent() {
   if (deps_.hubs == nullptr) return;
   const auto body = deps_.hubs->newest_locations();
-  for (const auto& hub : live_hubs()) {
-    auto& known = hubs_[hub.id];
-    if (body.empty() || body == known.sent || body == known.kept) continue;
+  if (body.empty()) return;
+  std::vector<Webhook> enabled;
+  {
+    const auto state = state_.lock();
+    enabled = state->enabled;
+  }
+  for (const auto& hub : enabled) {
+    const auto lane = lanes_.find(hub.id);
+    if (!takes_locations(hub) || lane == lanes_.end()) continue;
+    auto& known = lane->second->hub;
+    if (body == known.sent || body == known.kept) continue;
     keep(hub, known, body, {std::nullopt, "the server stopped before it was sent", false});
   }
 }

@@ -5,8 +5,10 @@
 #include <deque>
 #include <functional>
 #include <map>
+#include <memory>
 #include <mutex>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -27,7 +29,7 @@ namespace anchord::api {
 /// nothing is due.
 inline const std::vector<double> k_webhook_waits_s{30, 600, 7200, 72000};
 
-/// Speaks to omlox hubs (api/omlox). Blocks; one thread at a time.
+/// Speaks to omlox hubs (api/omlox). Blocks; thread-safe.
 class HubSender {
  public:
   struct Sent {
@@ -53,7 +55,8 @@ struct HubLive {
 
 /// Sends events to the webhooks that asked for them: at least once, in order of their time where nothing
 /// fails. An event waits in memory for the moment its row takes to be written; from then on it survives the
-/// process. The thread is there while there is an enabled webhook. Thread-safe.
+/// process. One thread writes the outbox, and each enabled webhook has one that sends: a slow receiver delays
+/// nobody else's. They are there while they have something to do. Thread-safe.
 class WebhookService {
  public:
   struct Deps {
@@ -88,8 +91,9 @@ class WebhookService {
   struct State {
     std::vector<Webhook> enabled;
     std::deque<WebhookDelivery> fresh;  ///< not in the outbox yet
-    bool look{false};                   ///< something changed: make a round
-    bool running{false};                ///< the thread
+    std::uint64_t news{0};              ///< counts what may make a round worth while
+    bool running{false};                ///< the thread that writes the outbox
+    std::set<WebhookId> sending;        ///< whose thread runs
     bool stopped{false};                ///< for good
     std::uint64_t dropped{0};
     std::map<WebhookId, HubLive> live;
@@ -100,40 +104,58 @@ class WebhookService {
     std::string fault;  ///< empty: it was taken
     bool canceled{false};
   };
-  /// Of one hub, what the thread knows.
+  /// Of one hub, what its thread knows.
   struct Hub {
     std::string sent, kept;  ///< locations that it took; that wait in the outbox
     std::int64_t due_ns{0};
     int failures{0};           ///< in a row
     std::uint64_t version{0};  ///< of the webhook
   };
+  /// One webhook and the thread that sends to it.
+  struct Lane {
+    Hub hub;  ///< touched by the thread alone
+    Thread thread;
+  };
+  /// What a round begins with.
+  struct Turn {
+    Webhook webhook;
+    std::uint64_t news{};
+  };
   WebhookDelivery delivery(const Webhook& webhook, const LiveEvent& event) const;
+  /// Starts threads that are missing and collects those that ended; under starting_.
+  void begin_threads();
+  /// Moves fresh events to the outbox until there is nobody to notify.
   void run();
-  /// Moves fresh ones to the outbox, makes what is due; nanoseconds until there is something to do.
-  std::int64_t round();
-  void attempt(const Webhook& webhook, WebhookDelivery delivery);
+  /// Whether there is nothing left to move for now; else the database takes nothing.
+  bool store_fresh();
+  void run_lane(const WebhookId& id, Lane& lane);
+  /// Makes what is due; nanoseconds until there is something to do.
+  std::int64_t round(const Webhook& webhook, Hub& known);
+  void attempt(const Webhook& webhook, Hub& known, WebhookDelivery delivery);
   Tried send_event(const Webhook& webhook, const WebhookDelivery& delivery, UtcTime now);
-  Tried send_to_hub(const Webhook& hub, const WebhookDelivery& delivery);
+  Tried send_to_hub(const Webhook& hub, Hub& known, const WebhookDelivery& delivery);
   static Tried tried(const Result<HubSender::Sent>& sent);
-  /// Sends hubs the newest locations, once a second while they change; nanoseconds until the next.
-  std::int64_t live_round();
+  /// Sends a hub the newest locations, once a second while they change; nanoseconds until the next.
+  std::int64_t live_round(const Webhook& hub, Hub& known);
   void send_live(const Webhook& hub, Hub& known, const std::string& body);
   /// Into the outbox, so that what a hub could not take outlives the process.
   void keep(const Webhook& hub, Hub& known, const std::string& body, const Tried& why);
   void keep_unsent();
-  std::vector<Webhook> live_hubs() const;
   bool stopped() const {
     const auto state = state_.lock();
     return state->stopped;
   }
-  /// Whether the thread is to end, which it then has: nobody is to be notified, or the server stops.
+  /// Whether the thread of the outbox is to end, which it then has: nobody is to be notified, or the server
+  /// stops.
   bool ended();
+  /// The same for the thread of a webhook: nothing where it is to end.
+  std::optional<Turn> turn_of(const WebhookId& id);
 
   Deps deps_;
-  std::map<WebhookId, Hub> hubs_;  ///< touched by the thread alone
   mutable Locked<State> state_;
   std::condition_variable wake_;
-  std::mutex starting_;  ///< the thread is begun or joined
+  std::mutex starting_;                               ///< threads are begun or joined
+  std::map<WebhookId, std::unique_ptr<Lane>> lanes_;  ///< under starting_
   Thread thread_;
 };
 

@@ -197,11 +197,11 @@ Result<ImageHead> head_of(Bytes bytes) {
   if (begins(bytes, k_tiff_big)) return tiff_head(bytes, true);
   const char* what = begins(bytes, k_bigtiff_little) || begins(bytes, k_bigtiff_big)
                          ? "a BigTIFF, which is not accepted"
-                         : "no PNG, JPEG, TIFF or DXF";
+                         : "no PNG, JPEG, TIFF, PDF or DXF";
   return make_error(
       Errc::unsupported,
       std::string("the file is ") + what +
-          ": send the plan as PNG, JPEG, (Geo)TIFF or ASCII DXF; export a DWG to DXF, a PDF or SVG to PNG");
+          ": send the plan as PNG, JPEG, (Geo)TIFF, PDF or ASCII DXF; export a DWG to DXF, an SVG to PDF");
 }
 
 }  // namespace

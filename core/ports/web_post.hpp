@@ -11,7 +11,7 @@ namespace anchord {
 
 /// Sends bodies to addresses that a client of ours named, and nowhere it could not reach itself: no loopback,
 /// private or link-local address unless the operator allows it, the address that was checked is the one that
-/// is connected to, no redirects, no proxy. Blocks; one thread at a time, stop() from any.
+/// is connected to, no redirects, no proxy. Blocks; thread-safe.
 class WebPost {
  public:
   struct Message {
@@ -37,7 +37,7 @@ class WebPost {
     BOOST_OUTCOME_TRY(const auto answer, send(message));
     return answer.status;
   }
-  /// Ends the post that runs, and every later one at once.
+  /// Ends the posts that run, and every later one at once.
   virtual void stop() = 0;
 };
 

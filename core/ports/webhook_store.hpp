@@ -25,8 +25,8 @@ class WebhookStore {
 
   /// In one transaction. Of a webhook that is gone nothing is kept.
   virtual Result<void> add(const std::vector<WebhookDelivery>& deliveries) = 0;
-  /// Pending ones of enabled webhooks, the first due first, whether due yet or not.
-  virtual Result<std::vector<WebhookDelivery>> pending(std::size_t limit) = 0;
+  /// Pending ones of a webhook, the first due first, whether due yet or not; none while it is disabled.
+  virtual Result<std::vector<WebhookDelivery>> pending(const WebhookId& webhook, std::size_t limit) = 0;
   /// What an attempt changed; nothing where the webhook went meanwhile.
   virtual Result<void> record(const WebhookDelivery& delivery) = 0;
   /// Newest first.

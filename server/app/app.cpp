@@ -356,8 +356,9 @@ void App::State::compose() {
     return out;
   };
   deps.geopackage = geopackage;
+  deps.feature_file = make_geopackage_file;
   deps.spool_dir = emptied_spool(data_dir);
-  web_post = make_web_post(config.flag("webhooks.allow_private"));
+  web_post = make_web_post(config.flag("webhooks.allow_private"), config.text("webhooks.ca_file"));
   deps.web_post = web_post.get();
   deps.broker = broker.get();
   deps.mqtt_prefix = config.text("mqtt.prefix");
@@ -379,6 +380,7 @@ void App::State::compose() {
   options.at_hand = [this](const api::Route& route, const api::Request& request) {
     return application->at_hand(route, request);
   };
+  options.slow_s = static_cast<double>(config.count("log_slow_ms")) / 1000;
   door = std::make_unique<Authenticator>(application->router(), application->ws_factory(),
                                          application->omlox_ws_factory(), *access, *metrics, options);
 }

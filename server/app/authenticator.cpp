@@ -385,15 +385,22 @@ api::Response Authenticator::problem(int status, std::string_view type, std::str
   return api::problem(status, type, std::move(detail));
 }
 
+bool Authenticator::is_slow(const api::Request& request, double seconds) const {
+  if (options_.slow_s <= 0 || seconds < options_.slow_s) return false;
+  return request.header("prefer").find("wait=") == std::string_view::npos;
+}
+
 void Authenticator::answered(const api::Request& request, std::string_view route, int status, double seconds,
                              std::size_t bytes_out) {
   metrics_.answered(route, api::to_string(request.method), status, seconds);
-  const LogLevel level = status >= 500 ? LogLevel::warning : LogLevel::debug;
+  const bool slow = is_slow(request, seconds);
+  const LogLevel level = status >= 500 || slow ? LogLevel::warning : LogLevel::debug;
   if (!logs(level)) return;
-  log(level, "request",
+  log(level, slow ? "slow request" : "request",
       {{"request_id", request.request_id},
        {"method", api::to_string(request.method)},
        {"path", request.path},
+       {"route", route},
        {"status", std::to_string(status)},
        {"ms", std::to_string(seconds * 1000)},
        {"bytes", std::to_string(bytes_out)},

@@ -26,6 +26,7 @@ struct AuthenticatorOptions {
   WsPlaceLimits places{};
   /// The answer to a permitted GET where it is at hand; asked on io threads, never waits.
   std::function<std::optional<api::Response>(const api::Route&, const api::Request&)> at_hand{};
+  double slow_s{0};  ///< a request that takes longer is logged; 0: none
 };
 
 /// Between the transport and the application: who asks, from which page, how often, and which route answers.
@@ -50,6 +51,8 @@ class Authenticator final : public Gateway {
   Admission live_omlox(const api::Request& request, bool websocket, const api::Login& login);
   /// Whether this login stands; holds its place among the live connections for as long as it is kept.
   std::function<bool()> standing(const api::Login& login, std::shared_ptr<void> place);
+  /// Longer than it should have taken: not where the client asked to wait.
+  bool is_slow(const api::Request& request, double seconds) const;
   std::function<bool()> let_in(const api::Request& request, std::string_view token);
   Admission at_once(Admission admission, const api::Route& route, api::Response& answer);
   Admission decide(api::Request& request, std::string_view host, bool websocket);

@@ -6,6 +6,7 @@
 #include <chrono>
 #include <functional>
 #include <optional>
+#include <set>
 
 #include "core/base/locked.hpp"
 #include "core/base/text.hpp"
@@ -85,7 +86,8 @@ std::vector<std::string> resolved(const Url& url) {
 
 class HttpPost final : public WebPost {
  public:
-  explicit HttpPost(bool allow_private) : allow_private_(allow_private) {}
+  HttpPost(bool allow_private, std::string ca_file)
+      : allow_private_(allow_private), ca_file_(std::move(ca_file)) {}
 
   Result<void> check(const std::string& url) const override {
     if (parse(url)) return boost::outcome_v2::success();
@@ -113,13 +115,13 @@ class HttpPost final : public WebPost {
   void stop() override {
     auto state = running_.lock();
     state->stopped = true;
-    if (state->client != nullptr) state->client->stop();
+    for (auto* client : state->clients) client->stop();
   }
 
  private:
   struct Running {
     bool stopped{false};
-    httplib::Client* client{nullptr};
+    std::set<httplib::Client*> clients;
   };
 
   Result<Answer> exchange(const Url& url, const std::string& pinned, const Message& message) {
@@ -132,6 +134,7 @@ class HttpPost final : public WebPost {
     client.set_hostname_addr_map({{url.host, pinned}});
     client.set_follow_location(false);
     client.set_keep_alive(false);
+    if (!ca_file_.empty()) client.set_ca_cert_path(ca_file_.c_str());
     client.set_url_encode(false);
     client.set_connection_timeout(k_step);
     client.set_read_timeout(k_step);
@@ -153,7 +156,7 @@ class HttpPost final : public WebPost {
       return answer.body.size() < k_most_answer && Steady::now() < end;
     };
     const auto result = client.send(request);
-    const bool stopped = leave();
+    const bool stopped = leave(&client);
     // The head of an answer without a body is not handed on before.
     if (result) answer.status = result->status;
     if (answer.status != 0) return answer;  // perhaps its body was cut off
@@ -165,23 +168,24 @@ class HttpPost final : public WebPost {
   bool enter(httplib::Client* client) {
     auto state = running_.lock();
     if (state->stopped) return false;
-    state->client = client;
+    state->clients.insert(client);
     return true;
   }
-  bool leave() {
+  bool leave(httplib::Client* client) {
     auto state = running_.lock();
-    state->client = nullptr;
+    state->clients.erase(client);
     return state->stopped;
   }
 
   const bool allow_private_;
+  const std::string ca_file_;
   Locked<Running> running_;
 };
 
 }  // namespace
 
-std::unique_ptr<WebPost> make_web_post(bool allow_private) {
-  return std::make_unique<HttpPost>(allow_private);
+std::unique_ptr<WebPost> make_web_post(bool allow_private, std::string ca_file) {
+  return std::make_unique<HttpPost>(allow_private, std::move(ca_file));
 }
 
 }  // namespace anchord::server

@@ -20,6 +20,8 @@
 #include "core/base/errc_words.hpp"
 #include "core/base/guard.hpp"
 #include "core/base/to_wire.hpp"
+#include "server/runtime/child_program.hpp"
+#include "server/runtime/file_sandbox.hpp"
 #include "server/runtime/frames.hpp"
 #include "server/runtime/worker_process.hpp"
 
@@ -38,7 +40,8 @@ void limit(__rlimit_resource what, rlim_t most) {
 }
 
 /// New sockets and programs are refused from here on: a model file that breaks the trainer gets no further.
-void close_the_doors() {
+/// `programs` are allowed where the work is to run one, which then has no sockets either.
+void close_the_doors(bool programs) {
   prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0);
   const auto refuse = [](unsigned number) {
     return std::array{sock_filter BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, number, 0, 1),
@@ -46,8 +49,9 @@ void close_the_doors() {
   };
   std::vector<sock_filter> program{
       sock_filter BPF_STMT(BPF_LD | BPF_W | BPF_ABS, offsetof(seccomp_data, nr))};
-  for (const unsigned number : {unsigned{SYS_socket}, unsigned{SYS_connect}, unsigned{SYS_bind},
-                                unsigned{SYS_execve}, unsigned{SYS_execveat}, unsigned{SYS_ptrace}}) {
+  std::vector<unsigned> refused{SYS_socket, SYS_connect, SYS_bind, SYS_ptrace};
+  if (!programs) refused.insert(refused.end(), {SYS_execve, SYS_execveat});
+  for (const unsigned number : refused) {
     for (const auto& step : refuse(number)) program.push_back(step);
   }
   program.push_back(sock_filter BPF_STMT(BPF_RET | BPF_K, SECCOMP_RET_ALLOW));
@@ -68,7 +72,14 @@ void settle_in(pid_t server) {
   limit(RLIMIT_DATA, rlim_t{4} << 30);
 #endif
   limit(RLIMIT_CPU, 24 * 3600);
-  close_the_doors();
+}
+
+/// Once it is known what the work is, and before any of it is looked at.
+void settle_for(const std::string& message) {
+  const bool page = api::is_page_work(message);
+  if (api::is_plan_work(message)) see_system_files_only();
+  if (page) limit(RLIMIT_CPU, static_cast<rlim_t>(api::k_plan_work_s));
+  close_the_doors(page);
 }
 
 std::string allowed_memory() {
@@ -88,6 +99,7 @@ int worker_main() {
     std::fputs("anchord worker: is started by the server, not by hand\n", stderr);
     return 2;
   }
+  settle_for(message);
   std::stop_source stop;
   std::mutex writing;
   const auto send = [&writing](const Json& json) {
@@ -116,7 +128,7 @@ int worker_main() {
   const bool plan = api::is_plan_work(message);
   const auto ran = guarded(plan ? "floor plan" : "training", [&] {  // the door of jobs, in this process
     try {
-      result = plan ? api::do_plan_work(message, stop.get_token(), told)
+      result = plan ? api::do_plan_work(message, stop.get_token(), told, run_program)
                     : api::do_work(message, stop.get_token(), told);
     } catch (const std::bad_alloc&) {
       message.clear();

@@ -9,6 +9,7 @@
 #include <bit>
 #include <cstring>
 #include <memory>
+#include <optional>
 
 #include "core/base/check.hpp"
 
@@ -130,44 +131,60 @@ void bind(SQLite::Statement& statement, int at, FeatureTable::Type type, const F
   statement.bind(at);
 }
 
-void add_rows(SQLite::Database& db, const FeatureTable& table) {
-  std::string create = "CREATE TABLE " + quoted(table.name) +
-                       " (fid INTEGER PRIMARY KEY AUTOINCREMENT NOT NULL, geom " +
-                       kind_of(table.geometry).name;
-  std::string insert = "INSERT INTO " + quoted(table.name) + " VALUES (NULL, ?";
-  for (const auto& column : table.columns) {
-    create += ", " + quoted(column.name) + ' ' + type_of(column.type);
-    insert += ", ?";
+/// Puts rows into a table that it creates.
+class RowWriter {
+ public:
+  RowWriter(SQLite::Database& db, const FeatureTable& table) : table_(head_of(table)) {
+    std::string create = "CREATE TABLE " + quoted(table.name) +
+                         " (fid INTEGER PRIMARY KEY AUTOINCREMENT NOT NULL, geom " +
+                         kind_of(table.geometry).name;
+    std::string insert = "INSERT INTO " + quoted(table.name) + " VALUES (NULL, ?";
+    for (const auto& column : table.columns) {
+      create += ", " + quoted(column.name) + ' ' + type_of(column.type);
+      insert += ", ?";
+    }
+    db.exec(create + ')');
+    statement_.emplace(db, insert + ')');
   }
-  db.exec(create + ')');
-  SQLite::Statement statement(db, insert + ')');
-  for (const auto& row : table.rows) {
-    ANCHORD_CHECK(row.values.size() == table.columns.size(),
-                  "a row of " << table.name << " has " << row.values.size() << " values for "
-                              << table.columns.size() << " columns");
+  void add(const FeatureTable::Row& row) {
+    ANCHORD_CHECK(row.values.size() == table_.columns.size(),
+                  "a row of " << table_.name << " has " << row.values.size() << " values for "
+                              << table_.columns.size() << " columns");
+    for (const auto& v : row.vertices) box_.extend(v);
     if (row.vertices.empty()) {
-      statement.bind(1);
+      statement_->bind(1);
     } else {
-      const auto blob = blob_of(table, row.vertices);
-      statement.bind(1, blob.data(), static_cast<int>(blob.size()));
+      const auto blob = blob_of(table_, row.vertices);
+      statement_->bind(1, blob.data(), static_cast<int>(blob.size()));
     }
     for (std::size_t i = 0; i < row.values.size(); ++i)
-      bind(statement, static_cast<int>(i) + 2, table.columns[i].type, row.values[i]);
-    statement.exec();
-    statement.reset();
+      bind(*statement_, static_cast<int>(i) + 2, table_.columns[i].type, row.values[i]);
+    statement_->exec();
+    statement_->reset();
   }
-}
+  const Eigen::AlignedBox3d& box() const { return box_; }
 
-void add_table(SQLite::Database& db, const FeatureTable& table, const std::string& now) {
+ private:
+  static FeatureTable head_of(const FeatureTable& table) {
+    FeatureTable out;
+    out.name = table.name;
+    out.geometry = table.geometry;
+    out.columns = table.columns;
+    return out;
+  }
+  FeatureTable table_;
+  std::optional<SQLite::Statement> statement_;
+  Eigen::AlignedBox3d box_;
+};
+
+/// What readers look for first; once the rows are there, for it has their bounds.
+void describe(SQLite::Database& db, const FeatureTable& table, const Eigen::AlignedBox3d& box,
+              const std::string& now) {
   SQLite::Statement contents(db, k_add_contents);
   contents.bind(1, table.name);
   contents.bind(2, table.title);
   contents.bind(3, table.description);
   contents.bind(4, now);
-  Eigen::AlignedBox3d box;
-  for (const auto& row : table.rows) {
-    for (const auto& v : row.vertices) box.extend(v);
-  }
   if (!box.isEmpty()) {
     contents.bind(5, box.min().x());
     contents.bind(6, box.min().y());
@@ -187,8 +204,59 @@ void add_table(SQLite::Database& db, const FeatureTable& table, const std::strin
     style.bind(4, now);
     style.exec();
   }
-  add_rows(db, table);
 }
+
+void add_table(SQLite::Database& db, const FeatureTable& table, const std::string& now) {
+  RowWriter writer(db, table);
+  for (const auto& row : table.rows) writer.add(row);
+  describe(db, table, writer.box(), now);
+}
+
+Error cannot_make(const SQLite::Exception& error) {
+  return make_error(error.getErrorCode() == SQLITE_FULL ? Errc::storage_full : Errc::storage_unavailable,
+                    std::string("a GeoPackage could not be made: ") + error.what());
+}
+
+class GeopackageFile final : public FeatureFile {
+ public:
+  GeopackageFile(const std::filesystem::path& path, const FeatureTable& head, UtcTime now)
+      : db_(path.string(), SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE),
+        now_(milliseconds(to_rfc3339(now))) {
+    db_.exec("PRAGMA journal_mode = OFF; PRAGMA synchronous = OFF; PRAGMA cache_size = -8000");
+    db_.exec(k_schema);
+    db_.exec("BEGIN");
+    writer_.emplace(db_, head);
+    for (const auto& row : head.rows) writer_->add(row);
+    head_ = head;
+    head_.rows.clear();
+  }
+  Result<void> add(std::span<const FeatureTable::Row> rows) override {
+    return tried([&] {
+      for (const auto& row : rows) writer_->add(row);
+    });
+  }
+  Result<void> finish() override {
+    return tried([&] {
+      describe(db_, head_, writer_->box(), now_);
+      db_.exec("COMMIT");
+    });
+  }
+
+ private:
+  template <class Work>
+  Result<void> tried(const Work& work) {
+    try {
+      work();
+    } catch (const SQLite::Exception& error) {
+      return cannot_make(error);
+    }
+    return boost::outcome_v2::success();
+  }
+  SQLite::Database db_;
+  const std::string now_;
+  FeatureTable head_;
+  std::optional<RowWriter> writer_;
+};
 
 }  // namespace
 
@@ -207,7 +275,16 @@ Result<std::string> geopackage(std::span<const FeatureTable> tables, UtcTime now
     std::memcpy(out.data(), bytes.get(), out.size());
     return out;
   } catch (const SQLite::Exception& error) {
-    return Error{Errc::storage_unavailable, std::string("a GeoPackage could not be made: ") + error.what()};
+    return cannot_make(error);
+  }
+}
+
+Result<std::unique_ptr<FeatureFile>> make_geopackage_file(const std::filesystem::path& path,
+                                                          const FeatureTable& head, UtcTime now) {
+  try {
+    return std::unique_ptr<FeatureFile>(std::make_unique<GeopackageFile>(path, head, now));
+  } catch (const SQLite::Exception& error) {
+    return cannot_make(error);
   }
 }
 

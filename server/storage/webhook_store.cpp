@@ -150,10 +150,10 @@ class SqlWebhookStore final : public WebhookStore {
         },
         deliveries.size());
   }
-  Result<std::vector<WebhookDelivery>> pending(std::size_t limit) override {
+  Result<std::vector<WebhookDelivery>> pending(const WebhookId& webhook, std::size_t limit) override {
     return deliveries_where(
-        "WHERE d.state = 0 AND w.enabled = 1 ORDER BY d.due_ran_ns, d.delivery_key LIMIT ?1",
-        [&](Query& query) { query << row_limit(limit); });
+        "WHERE w.id = ?1 AND d.state = 0 AND w.enabled = 1 ORDER BY d.due_ran_ns, d.delivery_key LIMIT ?2",
+        [&](Query& query) { query << webhook << row_limit(limit); });
   }
   Result<void> record(const WebhookDelivery& d) override {
     return write_void(gate_, [&](Connection& c) -> std::optional<Error> {

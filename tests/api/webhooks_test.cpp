@@ -35,6 +35,7 @@ class Receiver {
       response.status = n < answers_.size() ? answers_[n] : 204;
       if (response.status == 302) response.set_header("Location", "/elsewhere");
       came_.notify_all();
+      letters.wait(came_, [this](const auto&) { return !held_; });
     });
     server_.set_error_handler([this](const httplib::Request& request, httplib::Response&) {
       if (request.path == "/elsewhere") elsewhere_ = true;
@@ -45,10 +46,22 @@ class Receiver {
     thread_ = Thread("receiver", [this] { server_.listen_after_bind(); });
     while (!server_.is_running()) std::this_thread::yield();  // else stop() finds nothing to end
   }
-  ~Receiver() { stop(); }
+  ~Receiver() {
+    release();
+    stop();
+  }
   void stop() {
     server_.stop();
     if (thread_.joinable()) thread_.join();
+  }
+  /// Takes letters and does not answer them, until release().
+  void hold() { held_ = true; }
+  void release() {
+    {
+      const auto letters = letters_.lock();
+      held_ = false;
+    }
+    came_.notify_all();
   }
   std::string url() const { return "http://127.0.0.1:" + std::to_string(port_) + "/hook"; }
   int port() const { return port_; }
@@ -66,7 +79,7 @@ class Receiver {
   httplib::Server server_;
   Locked<std::vector<Letter>> letters_;
   std::condition_variable came_;
-  std::atomic<bool> elsewhere_{false};
+  std::atomic<bool> elsewhere_{false}, held_{false};
   int port_{};
   Thread thread_;
 };
@@ -189,6 +202,26 @@ TEST_F(Webhooks, WhatWasNotTakenIsSentAgainUnderItsIdAndRedirectsAreNotFollowed)
   EXPECT_EQ(Json::parse(letters[2].body)["subject"], "missions/" + id);
   EXPECT_EQ(delivery(made, "delivered")["attempts"], 3);
   EXPECT_FALSE(receiver.elsewhere());
+}
+
+TEST_F(Webhooks, ASlowReceiverDelaysNobodyElse) {
+  Receiver slow, quick;
+  slow.hold();
+  const Json to_slow = hook(slow.url()), to_quick = hook(quick.url());
+  finished_mission();
+  slow.letters(1);  // it has it, and does not answer
+  finished_mission();
+  finished_mission();
+  quick.letters(3);
+  const auto newest = [&](const Json& hook) {
+    return json(get("/api/v1/webhooks/" + hook["id"].get<std::string>() + "/deliveries"))["items"];
+  };
+  EXPECT_EQ(delivery(to_quick, "delivered")["attempts"], 1);
+  const Json waiting = newest(to_slow);
+  ASSERT_EQ(waiting.size(), 3U);
+  for (const auto& one : waiting) EXPECT_EQ(one["attempts"], 0) << "the first is still being answered";
+  slow.release();
+  EXPECT_EQ(delivery(to_slow, "delivered")["status"], 204);
 }
 
 TEST_F(Webhooks, AreGivenUpAfterTheLastWait) {

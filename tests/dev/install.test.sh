@@ -57,6 +57,19 @@ attempt in_root setpriv --reuid anchord --regid anchord --init-groups anchord to
 expect "a token" 0 'anc_'
 token=$output
 seconds_of "served, doctor"
+
+# A stranger's path (docs/tutorial.md): a flight of one's own as CSV tables goes in, is solved and published, and GDAL reads the anchors.
+address=$(cat "$new/var/lib/anchord/address") admin=$(cat "$new/var/lib/anchord/admin.token")
+attempt in_root anchord simulate flight --seed 7 --out /root/my-flight
+expect "CSV tables of a flight" 0 ''
+mission=$(in_root anchord import flight /root/my-flight --url "$address" --token-file /var/lib/anchord/admin.token 2>>"$store/install.log") || true
+ask() { curl -fsS -H "Authorization: Bearer $admin" -H 'Content-Type: application/json' "$@"; }
+calibration=$(ask -H 'Prefer: wait=300' -d "{\"missions\":[\"$mission\"]}" "$address/api/v1/calibrations" | jq -r .id) || true
+attempt ask -d '{"note":"first flight"}' "$address/api/v1/calibrations/$calibration/publish"
+expect "published" 0 '"revision":1'
+attempt ogrinfo -ro -so -oo "USERPWD=gis:$admin" "OAPIF:$address/ogc" anchors
+expect "the anchors in a GIS" 0 'Geometry: 3D Point.*Feature Count: [1-9]'
+seconds_of "a flight in, solved, published, read by GDAL"
 end
 
 attempt apt install /anchord-0.0.2.deb
@@ -76,4 +89,35 @@ attempt apt purge anchord
 expect "the purge" 0 'Deleting /var/lib/anchord'
 [[ ! -e $new/var/lib/anchord && ! -e $new/etc/anchord ]] ; pass_or_fail $? "the purge left data or settings"
 seconds_of "removed, purged"
+
+# --- The image, where no engine is: the steps of .ci/Dockerfile behind its build stage, then what docker-compose.yml starts in it, as its
+# user, in a network of its own, on a root that is read-only but for /data and /tmp. What the package needed is installed here already;
+# tests/dev/fresh_root.test.sh begins with nothing.
+image=$(awk '/^FROM/ {n++} n == 2' "$root/.ci/Dockerfile" | sed -e ':a' -e '/\\$/{N;s/\\\n//;ta' -e '}')
+while read -r word rest; do
+  case $word in
+    RUN) attempt in_root bash -c "$rest" ; expect "RUN of .ci/Dockerfile" 0 '' ;;
+    COPY) [[ $rest == --from=* ]] && install -D -m 0755 "$ANCHORD_BINARY" "$new/usr/local/bin/anchord" || cp "$root/${rest% *}" "$new${rest##* }" ;;
+    USER) user=$rest ;;
+  esac
+done <<<"$image"
+compose() { /usr/bin/python3 -c 'import sys, yaml, shlex
+one = yaml.safe_load(open(sys.argv[1]))["services"]["anchord"]
+print(shlex.join(one["command"] if sys.argv[2] == "command" else one["healthcheck"]["test"][1:]))' "$root/docker-compose.yml" "$1"; }
+entry=$(sed -n 's/^ENTRYPOINT \["\(.*\)"\]$/\1/p' "$root/.ci/Dockerfile")
+if mount --bind "$new" "$new" 2>/dev/null && unshare --net true 2>/dev/null; then
+  mount -t proc proc "$new/proc" && mount -t tmpfs tmpfs "$new/tmp" && mount -t tmpfs -o "uid=${user%:*},gid=${user#*:},mode=0700" tmpfs "$new/data" &&
+    mount -o remount,bind,ro "$new"
+  attempt unshare --net bash -c 'ip link set lo up
+    run() { env -i chroot --userspec='"$user $new"' "$@"; }
+    run '"$entry $(compose command)"' >'"$store"'/image.log 2>&1 & server=$!
+    for _ in {1..200}; do run '"$(compose healthcheck)"' 2>/dev/null && break; sleep 0.1; done
+    run '"$(compose healthcheck)"' && echo healthy; run /usr/bin/id -u; run /usr/bin/pdftoppm -v 2>&1 | head -n 1
+    run /usr/bin/touch /usr/bin/x 2>&1; kill $server; wait $server; echo "ended with $?"'
+  expect "the image" 0 'healthy.65532.pdftoppm version.*Read-only file system.ended with 0'
+  umount -R "$new"
+else
+  echo "    without mounts or a network of its own: the image was not run"
+fi
+seconds_of "the image"
 verdict

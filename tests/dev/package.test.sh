@@ -50,6 +50,11 @@ expect "the settings of the package" 0 ''
 attempt readelf -S "$tree/usr/bin/anchord"
 [[ $output != *.debug_info* ]] ; pass_or_fail $? "the executable is not stripped"
 
+# --- Debian's own check of packages: no error. What it says of less weight is printed.
+attempt lintian --fail-on error "$one"
+printf '%s\n' "$output" | sed 's/^/    /'
+expect "lintian" 0 ''
+
 # --- Compose: the form of the file, with every profile.
 for profile in field mqtt https; do
   attempt docker-compose -f docker-compose.yml --profile "$profile" config --quiet

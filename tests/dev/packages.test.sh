@@ -7,7 +7,7 @@ source tests/dev/checks.sh
 listed() { awk -v group="$1" '{sub(/#.*/, "")} NF && $2 == group {print $1}' .ci/packages; }   # listed "" | @GROUP
 twice=$(awk '{sub(/#.*/, "")} NF {print $1, $2}' .ci/packages | sort | uniq -d)
 [[ -z $twice ]] ; pass_or_fail $? ".ci/packages lists a package twice" "$twice"
-unknown=$(awk '{sub(/#.*/, "")} NF > 1 {print $2}' .ci/packages | sort -u | grep -vxE '@(runtime|test|lint|coverage|fuzz|bench|fresh)')
+unknown=$(awk '{sub(/#.*/, "")} NF > 1 {print $2}' .ci/packages | sort -u | grep -vxE '@(runtime|recommended|test|lint|coverage|fuzz|bench|fresh)')
 [[ -z $unknown ]] ; pass_or_fail $? "groups that no command installs" "$unknown"
 
 # --- nothing that nobody uses: a library's header is included somewhere, a program is named somewhere.
@@ -26,7 +26,7 @@ for package in $(listed "") $(listed @test) $(listed @bench) $(listed @lint) $(l
     [[ -n $used ]] ; pass_or_fail $? "no source includes a header of $package: take it out of .ci/packages"
   else
     used=
-    for program in $(grep -E '^/usr/s?bin/[^/]+$' <<<"$files" | sed 's|.*/||'); do
+    for program in $(grep -E '^(/usr)?/s?bin/[^/]+$' <<<"$files" | sed 's|.*/||'); do
       grep -rqwF --exclude-dir=node_modules --exclude-dir=build -e "$program" "${own[@]}" && { used=$program; break; }
     done
     # Neither headers nor programs: a library that is loaded by its name.

@@ -185,7 +185,7 @@ test('a building, its floor, the plan of it: sent, placed, traced, accepted, tak
   });
   await change('PATCH', f, 200, { ...merge, body: '{"base_height_m":0.1}' });
   const png = { headers: { 'content-type': 'image/png' } };
-  await change('PUT', `${f}/plan`, 415, { ...png, body: '%PDF-1.7' });
+  await change('PUT', `${f}/plan`, 415, { ...png, body: 'GIF89a' });
   await change('PUT', `${f}/plan`, 201, { ...png, body: room_png() });
   await call('GET', `${f}/plan`, { expect: 200 });
   await call('GET', `${f}/plan/preview`, { expect: 200 });

@@ -171,6 +171,43 @@ test('GDAL reads the GeoPackage: anchors with covariance, ellipses as polygons, 
   ]);
 });
 
+test('GDAL reads the GeoPackage of all ranges: as many as there are, each where the receiver was', async () => {
+  const file = join(folder, 'ranges.gpkg');
+  const answer = await server.fetch(`/api/v1/missions/${mission}/ranges.gpkg`);
+  assert.equal(answer.status, 200, await answer.clone().text());
+  writeFileSync(file, Buffer.from(await answer.arrayBuffer()));
+  const read = await layer(file, 'ranges');
+  assert.equal(read.geometry, '3D Point');
+  assert.match(read.summary, /ID\["EPSG",4979\]/);
+  const stored = (await (await server.fetch(`/api/v1/ranges?mission=${mission}&format=ndjson`)).text())
+    .trim()
+    .split('\n')
+    .map((line) => JSON.parse(line));
+  assert.equal(read.count, stored.length);
+  const fixes = (await (await server.fetch(`/api/v1/fixes?mission=${mission}&format=ndjson`)).text())
+    .trim()
+    .split('\n')
+    .map((line) => JSON.parse(line));
+  let placed = 0;
+  for (const [i, row] of stored.entries()) {
+    const { geometry, properties: p } = read.features[i];
+    assert.deepEqual(
+      [p.id, p.t_us, p.tag, p.anchor, p.distance_m],
+      [row.id, row.t_us, row.tag, row.anchor, row.distance_m],
+    );
+    const after = fixes.findIndex((fix) => fix.t_us >= row.t_us);
+    if (after < 1) continue;
+    const [a, b] = [fixes[after - 1], fixes[after]];
+    if (b.t_us - a.t_us > 2e6) continue;
+    const share = (row.t_us - a.t_us) / (b.t_us - a.t_us);
+    const place = ['lon', 'lat', 'h_m'].map((key) => a[key] + share * (b[key] - a[key]));
+    const off = geometry.coordinates.map((value, k) => Math.abs(value - place[k]));
+    assert.ok(off[0] < 1e-8 && off[1] < 1e-8 && off[2] < 1e-3, `${i}: ${off}`);
+    placed++;
+  }
+  assert.ok(placed > 0.9 * stored.length, `${placed} of ${stored.length} have a place`);
+});
+
 test('GDAL reads the DXF: a layer for each floor, 3-D points in the map system', async () => {
   const { features } = await layer(await exported('anchors.dxf'), 'entities');
   const points = features.filter((one) => one.properties.SubClasses !== 'AcDbText' && !one.properties.Text);

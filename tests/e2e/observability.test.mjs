@@ -2,10 +2,11 @@
 import assert from 'node:assert/strict';
 import { execFile } from 'node:child_process';
 import { readFileSync, writeFileSync } from 'node:fs';
+import { request } from 'node:http';
 import { join } from 'node:path';
 import { after, before, test } from 'node:test';
 import { promisify } from 'node:util';
-import { root, startServer } from './server.mjs';
+import { eventually, root, startServer } from './server.mjs';
 
 const monitoring = join(root, 'docs/monitoring');
 let server, metrics;
@@ -16,7 +17,7 @@ const promtool = (args, input) => {
 };
 
 before(async () => {
-  server = await startServer();
+  server = await startServer({ args: ['--log-slow-ms', '100'] });
   const device = { kind: 'ntrip', address: 'tcp://127.0.0.1:1', options: { mount: 'M' } };
   assert.equal((await server.fetch('/api/v1/devices', { json: device })).status, 201);
   metrics = await (await server.fetch('/metrics')).text();
@@ -56,4 +57,39 @@ test('each expression of the board is one that Prometheus can read', async () =>
   const file = join(server.dataDir, 'board.rules.json');
   writeFileSync(file, JSON.stringify({ groups: [{ name: 'board', rules }] })); // JSON is YAML
   assert.match((await promtool(['check', 'rules', file])).stdout, new RegExp(`${rules.length} rules found`));
+});
+
+/** A POST whose body comes late: what the server measures begins with the head. */
+const late = (id, headers = {}) =>
+  new Promise((done, fail) => {
+    const sending = request(
+      `${server.url}/api/v1/sites`,
+      { method: 'POST', headers: { 'content-type': 'application/json', 'x-request-id': id, ...headers } },
+      (answer) => {
+        answer.resume();
+        answer.once('end', () => done(answer));
+      },
+    );
+    sending.once('error', fail);
+    sending.write('{"name":');
+    setTimeout(() => sending.end(`"${id}"}`), 200);
+  });
+
+test('a slow request is a warning with the id that its client gave it, one that asked to wait is none', async () => {
+  assert.equal((await late('waits-12345678', { prefer: 'wait=5' })).statusCode, 201);
+  const answer = await late('slow-12345678');
+  assert.equal(answer.statusCode, 201);
+  assert.equal(answer.headers['x-request-id'], 'slow-12345678');
+  const lines = () =>
+    server.log
+      .split('\n')
+      .filter((line) => line.includes('slow request'))
+      .map((line) => JSON.parse(line));
+  const [line] = await eventually('the warning', () => lines().length > 0 && lines());
+  assert.deepEqual(
+    [line.request_id, line.method, line.route, line.status, line.level],
+    ['slow-12345678', 'POST', '/api/v1/sites', '201', 'warning'],
+  );
+  assert.ok(Number(line.ms) >= 190, line.ms);
+  assert.equal(lines().length, 1);
 });

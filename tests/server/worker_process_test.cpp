@@ -1,10 +1,15 @@
 // A worker that dies, in every way it may: the work gets a cause and advice, and the caller lives.
 #include "server/runtime/worker_process.hpp"
+#include "core/base/base64.hpp"
+#include "core/floor_plan/image.hpp"
+#include "server/runtime/file_sandbox.hpp"
 #include "tests/core/floor_plan/pictures.hpp"
 #include "tests/paths.hpp"
 
+#include <fcntl.h>
 #include <gtest/gtest.h>
 #include <sys/stat.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include <cstdio>
@@ -134,6 +139,88 @@ TEST_F(WorkerProcess, DecodesThePictureOfAFloorPlan) {
   const auto half = run(real, plan_message(floor_plan::png_head(400, 300)));
   ASSERT_FALSE(half);
   EXPECT_EQ(half.error().code, Errc::bad_frame);
+}
+
+/// A PDF 1.4 of two pages by hand: A4 across with a black bar of 300 x 8 points, 100 points from the left and
+/// from below; and one of so many inches, turned by 90 degrees.
+std::string two_pages(int inches) {
+  const std::string size = std::to_string(72 * inches);
+  const std::vector<std::string> objects{
+      "<</Type/Catalog/Pages 2 0 R>>", "<</Type/Pages/Kids[3 0 R 5 0 R]/Count 2>>",
+      "<</Type/Page/Parent 2 0 R/MediaBox[0 0 842 595]/Contents 4 0 R>>",
+      "<</Length 29>>stream\n0 0 0 rg 100 100 300 8 re f  \nendstream",
+      "<</Type/Page/Parent 2 0 R/MediaBox[0 0 " + size + " 72]/Rotate 90/Contents 4 0 R>>"};
+  std::string out = "%PDF-1.4\n", table;
+  for (std::size_t i = 0; i < objects.size(); ++i) {
+    char entry[32];
+    std::snprintf(entry, sizeof entry, "%010zu 00000 n \n", out.size());
+    table += entry;
+    out += std::to_string(i + 1) + " 0 obj\n" + objects[i] + "\nendobj\n";
+  }
+  const auto at = out.size();
+  return out + "xref\n0 6\n0000000000 65535 f \n" + table + "trailer<</Size 6/Root 1 0 R>>\nstartxref\n" +
+         std::to_string(at) + "\n%%EOF\n";
+}
+std::string page_message(const std::string& pdf, int page, int dpi = 100) {
+  return R"(floor_plan page {"task":"page","enu_from_pixel":[1,0,0,0,-1,0],"page":)" + std::to_string(page) +
+         R"(,"dots_per_inch":)" + std::to_string(dpi) + "}\n" + pdf;
+}
+
+TEST_F(WorkerProcess, DrawsAPageOfAPdfByPopplerAndRefusesWhatIsNone) {
+  const std::string real = "exec '" ANCHORD_BINARY "' worker";
+  const auto drawn = run(real, page_message(two_pages(10), 1));
+  ASSERT_TRUE(drawn) << drawn.error().message;
+  const auto json = nlohmann::json::parse(drawn.value());
+  EXPECT_EQ(json["pages"], 2);
+  const auto png = from_base64(json["png"].get<std::string>());
+  const auto image = floor_plan::decode_image(std::as_bytes(std::span(*png))).value();
+  EXPECT_NEAR(image.width_px, 842 / 0.72, 1);
+  EXPECT_NEAR(image.height_px, 595 / 0.72, 1);
+  const auto ink = [&](double x_pt, double y_pt) {  // from below, as in the file
+    const auto x = static_cast<int>(x_pt / 0.72), y = image.height_px - static_cast<int>(y_pt / 0.72);
+    return image.pixels[static_cast<std::size_t>(3 * (y * image.width_px + x))];
+  };
+  EXPECT_LT(ink(250, 104), 20);
+  EXPECT_GT(ink(250, 120), 235);
+  EXPECT_GT(ink(90, 104), 235);
+  const auto turned = run(real, page_message(two_pages(10), 2));
+  ASSERT_TRUE(turned) << turned.error().message;
+
+  const auto none = run(real, page_message(two_pages(10), 3));
+  ASSERT_FALSE(none);
+  EXPECT_NE(none.error().message.find("no page 3"), std::string::npos) << none.error().message;
+  const auto huge = run(real, page_message(two_pages(1'000'000), 2));
+  ASSERT_FALSE(huge);
+  EXPECT_NE(huge.error().message.find("of paper"), std::string::npos) << huge.error().message;
+  const auto broken = run(real, page_message(two_pages(10).substr(0, 60), 1));
+  ASSERT_FALSE(broken);
+  EXPECT_EQ(broken.error().code, Errc::bad_frame);
+  EXPECT_NE(broken.error().message.find("pdfinfo failed"), std::string::npos) << broken.error().message;
+  EXPECT_NE(broken.error().message.find("export the PDF again"), std::string::npos) << broken.error().message;
+}
+
+TEST_F(WorkerProcess, APageWithoutItsMarkRunsNoProgram) {
+  auto message = page_message(two_pages(10), 1);
+  message.erase(message.find("page "), 5);  // settled as for any other picture
+  const auto refused = run("exec '" ANCHORD_BINARY "' worker", message);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, Errc::unsupported);
+}
+
+TEST(FileSandbox, ShowsTheSystemsFilesAndNoOthers) {
+  const pid_t child = ::fork();
+  ASSERT_GE(child, 0);
+  if (child == 0) {
+    see_system_files_only();
+    const bool sees_system = ::open("/usr/bin/env", O_RDONLY) >= 0,
+               sees_own = ::open("/etc/passwd", O_RDONLY) >= 0;
+    const bool writes = ::open("/tmp/anchord_sandbox_test", O_WRONLY | O_CREAT, 0600) >= 0;
+    _exit((sees_system ? 1 : 0) + (sees_own ? 2 : 0) + (writes ? 4 : 0));
+  }
+  int status = 0;
+  ASSERT_EQ(::waitpid(child, &status, 0), child);
+  if (WEXITSTATUS(status) == 7) GTEST_SKIP() << "this kernel has no Landlock";
+  EXPECT_EQ(WEXITSTATUS(status), 1);
 }
 
 TEST_F(WorkerProcess, ADecoderThatDiesSaysNothingOfTraining) {

@@ -115,7 +115,7 @@ TEST(PlanImage, OfAnotherKindIsRefusedWithWhatIsAccepted) {
     const auto head = image_head(bytes(file));
     ASSERT_FALSE(head.has_value()) << file;
     EXPECT_EQ(head.error().code, Errc::unsupported);
-    EXPECT_NE(head.error().message.find("PNG, JPEG, (Geo)TIFF or ASCII DXF"), std::string::npos);
+    EXPECT_NE(head.error().message.find("PNG, JPEG, (Geo)TIFF, PDF or ASCII DXF"), std::string::npos);
   }
 }
 

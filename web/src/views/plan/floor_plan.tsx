@@ -200,10 +200,14 @@ function NewFloor({
 function Sent({ held, busy, send }: { held: Held; busy: string; send: (file: File) => void }) {
   return (
     <label class="btn">
-      {busy === 'send' ? 'Sending' : held.floor.plan ? 'Replace the plan' : 'Send a plan (PNG, JPEG, GeoTIFF, DXF)'}
+      {busy === 'send'
+        ? 'Sending'
+        : held.floor.plan
+          ? 'Replace the plan'
+          : 'Send a plan (PNG, JPEG, GeoTIFF, PDF, DXF)'}
       <input
         type="file"
-        accept=".png,.jpg,.jpeg,.tif,.tiff,.dxf"
+        accept=".png,.jpg,.jpeg,.tif,.tiff,.pdf,.dxf"
         hidden
         aria-label="Plan of the floor"
         data-testid="plan-file"
