@@ -109,11 +109,11 @@ if mount --bind "$new" "$new" 2>/dev/null && unshare --net true 2>/dev/null; the
   mount -t proc proc "$new/proc" && mount -t tmpfs tmpfs "$new/tmp" && mount -t tmpfs -o "uid=${user%:*},gid=${user#*:},mode=0700" tmpfs "$new/data" &&
     mount -o remount,bind,ro "$new"
   attempt unshare --net bash -c 'ip link set lo up
-    run() { env -i chroot --userspec='"$user $new"' "$@"; }
-    run '"$entry $(compose command)"' >'"$store"'/image.log 2>&1 & server=$!
-    for _ in {1..200}; do run '"$(compose healthcheck)"' 2>/dev/null && break; sleep 0.1; done
-    run '"$(compose healthcheck)"' && echo healthy; run /usr/bin/id -u; run /usr/bin/pdftoppm -v 2>&1 | head -n 1
-    run /usr/bin/touch /usr/bin/x 2>&1; kill $server; wait $server; echo "ended with $?"'
+    run=(env -i /usr/sbin/chroot --userspec='"$user $new"')
+    "${run[@]}" '"$entry $(compose command)"' >'"$store"'/image.log 2>&1 & server=$!
+    for _ in {1..200}; do "${run[@]}" '"$(compose healthcheck)"' 2>/dev/null && break; sleep 0.1; done
+    "${run[@]}" '"$(compose healthcheck)"' && echo healthy; "${run[@]}" /usr/bin/id -u; "${run[@]}" /usr/bin/pdftoppm -v 2>&1 | head -n 1
+    "${run[@]}" /usr/bin/touch /usr/bin/x 2>&1; kill $server; wait $server; echo "ended with $?"'
   expect "the image" 0 'healthy.65532.pdftoppm version.*Read-only file system.ended with 0'
   umount -R "$new"
 else

@@ -12,6 +12,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
@@ -141,15 +142,8 @@ TEST_F(WorkerProcess, DecodesThePictureOfAFloorPlan) {
   EXPECT_EQ(half.error().code, Errc::bad_frame);
 }
 
-/// A PDF 1.4 of two pages by hand: A4 across with a black bar of 300 x 8 points, 100 points from the left and
-/// from below; and one of so many inches, turned by 90 degrees.
-std::string two_pages(int inches) {
-  const std::string size = std::to_string(72 * inches);
-  const std::vector<std::string> objects{
-      "<</Type/Catalog/Pages 2 0 R>>", "<</Type/Pages/Kids[3 0 R 5 0 R]/Count 2>>",
-      "<</Type/Page/Parent 2 0 R/MediaBox[0 0 842 595]/Contents 4 0 R>>",
-      "<</Length 29>>stream\n0 0 0 rg 100 100 300 8 re f  \nendstream",
-      "<</Type/Page/Parent 2 0 R/MediaBox[0 0 " + size + " 72]/Rotate 90/Contents 4 0 R>>"};
+/// A PDF 1.4 by hand; object 1 is its catalogue.
+std::string pdf_of(const std::vector<std::string>& objects, const std::string& trailer = {}) {
   std::string out = "%PDF-1.4\n", table;
   for (std::size_t i = 0; i < objects.size(); ++i) {
     char entry[32];
@@ -157,9 +151,19 @@ std::string two_pages(int inches) {
     table += entry;
     out += std::to_string(i + 1) + " 0 obj\n" + objects[i] + "\nendobj\n";
   }
-  const auto at = out.size();
-  return out + "xref\n0 6\n0000000000 65535 f \n" + table + "trailer<</Size 6/Root 1 0 R>>\nstartxref\n" +
-         std::to_string(at) + "\n%%EOF\n";
+  const auto at = out.size(), size = objects.size() + 1;
+  return out + "xref\n0 " + std::to_string(size) + "\n0000000000 65535 f \n" + table + "trailer<</Size " +
+         std::to_string(size) + "/Root 1 0 R" + trailer + ">>\nstartxref\n" + std::to_string(at) +
+         "\n%%EOF\n";
+}
+/// Two pages: A4 across with a black bar of 300 x 8 points, 100 points from the left and from below; and one
+/// of so many inches, turned by 90 degrees.
+std::string two_pages(int inches) {
+  const std::string size = std::to_string(72 * inches);
+  return pdf_of({"<</Type/Catalog/Pages 2 0 R>>", "<</Type/Pages/Kids[3 0 R 5 0 R]/Count 2>>",
+                 "<</Type/Page/Parent 2 0 R/MediaBox[0 0 842 595]/Contents 4 0 R>>",
+                 "<</Length 29>>stream\n0 0 0 rg 100 100 300 8 re f  \nendstream",
+                 "<</Type/Page/Parent 2 0 R/MediaBox[0 0 " + size + " 72]/Rotate 90/Contents 4 0 R>>"});
 }
 std::string page_message(const std::string& pdf, int page, int dpi = 100) {
   return R"(floor_plan page {"task":"page","enu_from_pixel":[1,0,0,0,-1,0],"page":)" + std::to_string(page) +
@@ -197,6 +201,45 @@ TEST_F(WorkerProcess, DrawsAPageOfAPdfByPopplerAndRefusesWhatIsNone) {
   EXPECT_EQ(broken.error().code, Errc::bad_frame);
   EXPECT_NE(broken.error().message.find("pdfinfo failed"), std::string::npos) << broken.error().message;
   EXPECT_NE(broken.error().message.find("export the PDF again"), std::string::npos) << broken.error().message;
+}
+
+TEST_F(WorkerProcess, HostilePdfsAreRefusedOrDrawnWithoutWhatTheyAskFor) {
+  const std::string real = "exec '" ANCHORD_BINARY "' worker", catalog = "<</Type/Catalog/Pages 2 0 R>>",
+                    tree = "<</Type/Pages/Kids[3 0 R]/Count 1>>",
+                    page = "<</Type/Page/Parent 2 0 R/MediaBox[0 0 72 72]";
+  const std::string id = "<00112233445566778899aabbccddeeff>";
+  const std::string locked = "/ID[" + id + id + "]/Encrypt<</Filter/Standard/V 2/R 3/Length 128/P -4/O<" +
+                             std::string(64, '1') + ">/U<" + std::string(64, '2') + ">>>";
+  const struct {
+    std::string what, pdf;
+    int page;
+  } refused[] = {
+      {"a page tree that is its own child", pdf_of({catalog, "<</Type/Pages/Kids[2 0 R]/Count 999999>>"}), 1},
+      {"a count that is too high", pdf_of({catalog, "<</Type/Pages/Kids[3 0 R]/Count 999>>", page + ">>"}),
+       500},
+      {"a password", pdf_of({catalog, tree, page + ">>"}, locked), 1},
+  };
+  for (const auto& [what, pdf, number] : refused) {
+    const auto answer = run(real, page_message(pdf, number));
+    ASSERT_FALSE(answer) << what;
+    EXPECT_TRUE(answer.error().code == Errc::bad_frame || answer.error().code == Errc::invalid_argument)
+        << what << ": " << answer.error().message;
+  }
+  const std::pair<std::string, std::string> drawn[] = {
+      {"a script and a program",
+       pdf_of({"<</Type/Catalog/Pages 2 0 R/OpenAction<</S/JavaScript/JS(app.alert\\(1\\))>>>>", tree,
+               page + "/AA<</O<</S/Launch/F(/bin/sh)>>>>>>"})},
+      {"contents in a file of the machine", pdf_of({catalog, tree, page + "/Contents 4 0 R>>",
+                                                    "<</Length 0/F(/etc/passwd)>>stream\n\nendstream"})},
+  };
+  for (const auto& [what, pdf] : drawn) {
+    const auto answer = run(real, page_message(pdf, 1));
+    ASSERT_TRUE(answer) << what << ": " << answer.error().message;
+    const auto png = from_base64(nlohmann::json::parse(answer.value())["png"].get<std::string>());
+    const auto image = floor_plan::decode_image(std::as_bytes(std::span(*png))).value();
+    EXPECT_EQ(std::ranges::count(image.pixels, 255), std::ranges::ssize(image.pixels))
+        << what << ": not blank";
+  }
 }
 
 TEST_F(WorkerProcess, APageWithoutItsMarkRunsNoProgram) {
