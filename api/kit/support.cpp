@@ -167,10 +167,10 @@ std::optional<double> query_number(const Request& request, const char* name, dou
   if (!text) return std::nullopt;
   double value = 0;
   const auto [end, status] = std::from_chars(text->data(), text->data() + text->size(), value);
-  if (status != std::errc{} || end != text->data() + text->size() || !(value >= low && value <= high))
-    throw_problem(422, "validation", std::string(name) + " must be a number",
-                  {{std::string("/") + name, "bad_value",
-                    "must be " + std::to_string(low) + ".." + std::to_string(high)}});
+  if (status != std::errc{} || end != text->data() + text->size() || !(value >= low && value <= high)) {
+    const auto bound = [](double x) { return to_wire(Json(x)); };
+    bad_query(name, "must be a number, " + bound(low) + ".." + bound(high));
+  }
   return value;
 }
 

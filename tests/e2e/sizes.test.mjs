@@ -89,3 +89,21 @@ test('in forced colours nothing is lost: states have shape and word, buttons an 
   await picture(page, 'forced-colours');
   await page.close();
 });
+
+test('a server that was killed and started again: the page is back by itself, with what is there now', async () => {
+  const { page, id } = await openPage(browser, server);
+  const live = () => eventually('LIVE', async () => (await text(id('status-link'))).includes('LIVE'), 20_000);
+  await live();
+  await server.kill();
+  await id('alarm-link.lost').or(id('status-link').getByText('LOST')).first().waitFor({ timeout: 20_000 });
+  await server.start();
+  await live();
+  const made = await server.fetch('/api/v1/missions', { json: { name: 'After the restart', frame: 'wgs84' } });
+  assert.equal(made.status, 201);
+  await eventually(
+    'the flight that began after it is in the page',
+    async () => (await page.getByText('After the restart').count()) > 0,
+    20_000,
+  );
+  await page.close();
+});
