@@ -224,6 +224,7 @@ TEST(WireWords, AreThoseOfOpenApi) {
       {"PlanDifference.areas.change", words(planning::k_changed_words)},
       {"FlightCommand.state", words(k_command_state_words)},
       {"ControlAction.action", words(flight::k_control_words)},
+      {"AnchorOrder.action", words(procedure::k_anchor_order_words)},
       {"Grid.rule", words(planning::k_rule_words)},
       {"PlanSettings.rule", words(planning::k_rule_words)},
       {"Grid.combine", words(planning::k_combine_words)},

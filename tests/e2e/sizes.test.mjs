@@ -98,7 +98,9 @@ test('a server that was killed and started again: the page is back by itself, wi
   await id('alarm-link.lost').or(id('status-link').getByText('LOST')).first().waitFor({ timeout: 20_000 });
   await server.start();
   await live();
-  const made = await server.fetch('/api/v1/missions', { json: { name: 'After the restart', frame: 'wgs84' } });
+  const made = await server.fetch('/api/v1/missions', {
+    json: { name: 'After the restart', frame: 'wgs84', track_point: 'tag_antenna' },
+  });
   assert.equal(made.status, 201);
   await eventually(
     'the flight that began after it is in the page',
