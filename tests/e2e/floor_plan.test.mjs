@@ -144,7 +144,7 @@ test('a PDF that Chromium printed is a plan: its second page, placed by three po
     [0, height_px],
   ].map(([x, y]) => ({ pixel: [x, y], enu_m: [(x / width_px) * 21, -(y / height_px) * 14.85] }));
   await send('PUT', `${path}/georeference`, { json: { points }, headers: { 'if-match': sent.etag } });
-  const { json: traced } = await send('POST', `${path}/trace`, { json: {}, headers: { prefer: 'wait=60' } });
+  const { json: traced } = await send('POST', `${path}/trace`, { json: {}, headers: { prefer: 'wait=200' } });
   const [ring] = traced.outline.coordinates;
   assert.equal(ring.length, 5, JSON.stringify(traced));
   const turned = [
