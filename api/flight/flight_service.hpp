@@ -130,8 +130,9 @@ class FlightService final : public MissionObserver, public MissionControl {
   /// errors  conflict: no control; invalid_argument: refused, with every reason; or another revision, or
   /// another next waypoint, than the person has seen
   Result<PlanDifference> take_plan(const MissionId& mission, const PlanOrder& order, const Principal& who);
-  /// In flight: ends the work on an anchor, or takes that back. Only a position with the verdict ok is accepted.
-  /// errors  conflict: no control; invalid_argument: not flown, no range of it, not ok, nothing to take back
+  /// In flight: ends the work on an anchor, or takes that back. Only a position with the verdict ok is
+  /// accepted. errors  conflict: no control; invalid_argument: not flown, no range of it, not ok, nothing to
+  /// take back
   Result<void> order_anchor(const MissionId& mission, NetworkId anchor, procedure::AnchorOrder order,
                             const std::string& lease, const Principal& who);
   /// A revision of a plan was stored.

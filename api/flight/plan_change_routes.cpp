@@ -94,8 +94,8 @@ void add_plan_change_routes(Router& router, FlightApi& s) {
   const std::string base = "/api/v1/missions/{id}/plan";
   router.add({Method::get, base, readers(), on(flown_plan)});
   router.add(as_heavy({Method::get, base + "/change", readers(), on(difference)}));
-  router.add(keeps_always({Method::post, "/api/v1/missions/{id}/anchors/{anchor}/work", op,
-                           on(order_anchor), k_command_bytes}));
+  router.add(keeps_always(
+      {Method::post, "/api/v1/missions/{id}/anchors/{anchor}/work", op, on(order_anchor), k_command_bytes}));
   router.add(keeps_always(as_flight({Method::post, base, op, on(take), k_command_bytes})));
 }
 

@@ -60,7 +60,7 @@ struct FlownChanges {
   std::optional<DroneFence> autopilot_keeps;  ///< given on the ground, not to be changed in the air
   bool own_origin{true};                      ///< the stored plan has one; else the take-off gave it
   std::uint64_t saved_revision{0};            ///< newest that is stored of the plan; 0: none since the start
-  std::uint64_t n_anchor_orders{0};           ///< anchors accepted, given up or reopened by hand since the start
+  std::uint64_t n_anchor_orders{0};  ///< anchors accepted, given up or reopened by hand since the start
 };
 
 /// One flight, in the air or just landed.

@@ -1,5 +1,5 @@
-// What a person changes in flight: the plan (who asks, what it stands on, from when it is flown), and the work
-// on an anchor.
+// What a person changes in flight: the plan (who asks, what it stands on, from when it is flown), and the
+// work on an anchor.
 #include <utility>
 
 #include "core/flight/operations.hpp"

@@ -106,8 +106,8 @@ TEST_F(Resources, AnAnchorsEtagChangesWithWhatItShowsOfItsSite) {
   EXPECT_EQ(json(read)["properties"]["crs"]["frame"], "ETRS89");
 }
 
-// What a socket answers by itself is what the store would say: kept only until anything is written that it may
-// show.
+// What a socket answers by itself is what the store would say: kept only until anything is written that it
+// may show.
 TEST_F(Resources, AnAnchorThatWasReadIsAtHandUntilAnythingIsWritten) {
   const std::string path = "/api/v1/anchors/0x6a2f";
   const auto at_hand = [&](const Call& options = {}) {
