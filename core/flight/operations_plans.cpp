@@ -70,10 +70,11 @@ Result<void> Operations::order_anchor(const Now& now, const MissionId& mission, 
         "this mission is not being flown: anchors of a finished flight are accepted in its review");
   auto& f = *flight_;
   if (!f.control.engine().end_work(now.s, anchor, order, who))
-    return make_error(Errc::invalid_argument,
-                      order == procedure::AnchorOrder::reopen
-                          ? "nobody has ended the work on " + to_string(anchor)
-                          : "no range of " + to_string(anchor) + " has come in this flight");
+    return make_error(
+        Errc::invalid_argument,
+        order == procedure::AnchorOrder::reopen
+            ? to_string(anchor) + " was neither accepted nor given up: there is nothing to take back"
+            : "no range of " + to_string(anchor) + " has come in this flight");
   ++f.changes.n_anchor_orders;
   take_events(f);
   show_soon_ = true;

@@ -211,8 +211,7 @@ class Flights {
   }
 
   Result<void> failed(const std::string& name, const server::ClientResponse& answer) {
-    out_.failed.push_back(name + ": " + in_words(answer));
-    options_.report(out_.failed.back());
+    refused(out_, options_, name + ": " + in_words(answer));
     return boost::outcome_v2::success();
   }
 

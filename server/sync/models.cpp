@@ -39,8 +39,7 @@ Result<void> send_models(Peer& field, Peer& centre, const SyncOptions& options, 
       ++outcome.models_sent;
       options.report(name + ": arrived, not active");
     } else {
-      outcome.failed.push_back(name + ": " + failure);
-      options.report(outcome.failed.back());
+      refused(outcome, options, name + ": " + failure);
     }
   }
   return boost::outcome_v2::success();

@@ -175,8 +175,7 @@ class Positions {
       out_.anchors_published += anchors.size();
       options_.report(name + ": published");
     } else {
-      out_.failed.push_back(name + ": " + sync::in_words(answer));
-      options_.report(out_.failed.back());
+      refused(out_, options_, name + ": " + sync::in_words(answer));
     }
     return boost::outcome_v2::success();
   }

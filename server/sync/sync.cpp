@@ -27,6 +27,11 @@ Result<void> check_centre(Peer& centre, const SyncOptions& options) {
 
 }  // namespace
 
+void refused(Outcome& outcome, const SyncOptions& options, const std::string& what) {
+  outcome.failed.push_back(what);
+  options.report(what);
+}
+
 Result<Outcome> sync_up(Peer& field, Peer& centre, const SyncOptions& options) {
   Outcome outcome;
   BOOST_OUTCOME_TRYV(check_centre(centre, options));

@@ -50,6 +50,9 @@ struct SyncOptions {
   std::function<void(const std::string& line)> report;
 };
 
+/// Notes and reports what did not go, with the reason.
+void refused(Outcome& outcome, const SyncOptions& options, const std::string& what);
+
 /// Field to centre: finished flights as bundles, models, published positions. What is there already stays; a
 /// repetition adds nothing. errors: of the links (what arrived has arrived)
 Result<Outcome> sync_up(Peer& field, Peer& centre, const SyncOptions& options);
