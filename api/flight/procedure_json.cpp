@@ -54,6 +54,8 @@ Ordered anchors_json(const procedure::FlightEngine& engine) {
 }  // namespace
 
 Ordered drone_json(const DroneStatus& d) {
+  // Who was never heard has been silent since the start of the server, which says nothing of the aircraft.
+  const bool heard = d.connected || d.identity.system != 0;
   Ordered others = Ordered::array();
   for (const auto& o : d.others) {
     others.push_back({{"sender", o.sender},
@@ -64,7 +66,7 @@ Ordered drone_json(const DroneStatus& d) {
                       {"silent_s", o.silent_s}});
   }
   return {{"connected", d.connected},
-          {"silent_s", finite_or_null(d.silent_s)},
+          {"silent_s", heard ? finite_or_null(d.silent_s) : Ordered(nullptr)},
           {"autopilot", d.autopilot},
           {"mode", d.mode},
           {"armed", d.armed},

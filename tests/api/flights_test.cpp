@@ -9,6 +9,7 @@
 #include <set>
 #include <thread>
 
+#include "api/flight/procedure_json.hpp"
 #include "core/ports/access_store.hpp"
 #include "core/ports/devices.hpp"
 #include "core/ports/plan_store.hpp"
@@ -454,6 +455,14 @@ TEST_F(Flights, WhenThePilotTakesOverNothingIsSentUntilTheOperatorTakesItBack) {
   fly(2);
   EXPECT_FALSE(drone_->targets.empty());
   EXPECT_EQ(drone_->session.status().mode, "GUIDED");
+}
+
+TEST(AircraftJson, HasNoSilenceBeforeTheAircraftWasHeard) {
+  DroneStatus status;
+  status.silent_s = 20838;  // the server's own time
+  EXPECT_TRUE(api::drone_json(status)["silent_s"].is_null());
+  status.identity.system = 1;
+  EXPECT_EQ(api::drone_json(status)["silent_s"], 20838.0);
 }
 
 TEST_F(Flights, WithoutAnAircraftToCommandThePilotIsShownWhereToGo) {

@@ -154,6 +154,17 @@ TEST(TopScreen, ShowsTheMissionThatRecordsWithItsAircraftAndLeavesFinishedOnesOu
       << text;
 }
 
+TEST(TopScreen, TellsAnAircraftThatWasNeverHeardFromOneThatFellSilent) {
+  auto documents = empty_server();
+  auto system = Json::parse(documents.system.body);
+  system["drone"] = {{"connected", false}, {"silent_s", nullptr}};
+  documents.system.body = system.dump();
+  EXPECT_NE(screen(documents).find("Aircraft: NOT CONNECTED, never heard\n"), std::string::npos);
+  system["drone"]["silent_s"] = 12.4;
+  documents.system.body = system.dump();
+  EXPECT_NE(screen(documents).find("Aircraft: NOT CONNECTED, silent for 12 s\n"), std::string::npos);
+}
+
 TEST(TopScreen, ShowsJobsThatRunAndThoseThatFailedWithinTheHour) {
   auto documents = empty_server();
   const auto failed = [](const char* at, const char* why) {

@@ -163,7 +163,7 @@ function Aircraft({ drone: d }: { drone: DroneMsg | null }) {
               {d.connected
                 ? d.text
                 : 'Nothing was received from the autopilot ' +
-                  `${d.autopilot && d.silent_s !== null ? `for ${age(d.silent_s * 1000)}` : 'yet'}: power, telemetry radio, ` +
+                  `${d.silent_s !== null ? `for ${age(d.silent_s * 1000)}` : 'yet'}: power, telemetry radio, ` +
                   'drone.address.'}
             </span>
           </div>
@@ -194,7 +194,7 @@ function Aircraft({ drone: d }: { drone: DroneMsg | null }) {
             </div>
             <div>
               <dt>Last seen</dt>
-              <dd>{d.silent_s === null || !d.autopilot ? 'never' : `${age(d.silent_s * 1000)} ago`}</dd>
+              <dd>{d.silent_s === null ? 'never' : `${age(d.silent_s * 1000)} ago`}</dd>
             </div>
           </dl>
           {d.frames_refused > 0 && (
