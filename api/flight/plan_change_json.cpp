@@ -26,6 +26,15 @@ Ordered names(const std::vector<NetworkId>& anchors) {
   return out;
 }
 
+Ordered targets(const std::vector<planning::TargetChange>& changes) {
+  auto out = Ordered::array();
+  for (const auto& c : changes)
+    out.push_back({{"network_id", to_string(c.anchor)},
+                   {"before", or_null(c.before_m)},
+                   {"after", or_null(c.after_m)}});
+  return out;
+}
+
 /// Settings that differ, and what else of the plan is one value.
 Ordered settings_changed(const Plan& before, const Plan& after) {
   auto out = Ordered::array();
@@ -82,6 +91,7 @@ Ordered plan_difference_json(const MissionId& mission, const FlightService::Plan
           {"areas", std::move(areas)},
           {"anchors_added", names(p.change.anchors_added)},
           {"anchors_removed", names(p.change.anchors_removed)},
+          {"anchor_targets", targets(p.change.targets)},
           {"settings", settings_changed(difference.before, p.plan)},
           {"forecast_before_s", time_json(p.before_s)},
           {"forecast_after_s", time_json(p.after_s)}};

@@ -39,6 +39,7 @@ Ordered anchors_json(const procedure::FlightEngine& engine) {
                    {"reached", a.reached},
                    {"ended_by", a.ended_by.empty() ? Ordered(nullptr) : Ordered(a.ended_by)},
                    {"accepted", a.accepted},
+                   {"target_sigma_m", or_null(engine.setup().exit_rule(a.id).target_sigma_m)},
                    {"why", a.why},
                    {"iterations", a.iterations},
                    {"waiting", a.waiting},

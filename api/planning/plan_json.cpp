@@ -15,6 +15,7 @@ using Json = nlohmann::json;
 using Ordered = nlohmann::ordered_json;
 
 constexpr double k_max_height_m = 500;
+constexpr double k_min_target_m = 0.001, k_max_target_m = 10;
 constexpr std::size_t k_max_waypoints = 1000, k_max_corners = 1000, k_max_areas = 100, k_max_anchors = 1000;
 
 Ordered polygon_json(const GeoPolygon& polygon) {
@@ -86,7 +87,7 @@ void read_settings(const Json& json, PlanSettings& s, std::vector<FieldError>& e
   if (const auto combine = f.word("combine", planning::k_combine_words)) s.combine = *combine;
   whole("min_iterations", 1, 1000, s.min_iterations);
   whole("max_iterations", 1, 1000, s.max_iterations);
-  take(f.number("target_sigma_m", 0.001, 10), s.target_sigma_m);
+  take(f.number("target_sigma_m", k_min_target_m, k_max_target_m), s.target_sigma_m);
   if (const auto value = f.number("target_gdop", 0.1, 1000)) s.target_gdop = *value;
   if (const auto value = f.number("max_flight_s", 10, 14'400)) s.max_flight_s = *value;
   take(f.number("min_battery", 0.1, 0.95), s.min_battery);
@@ -110,6 +111,27 @@ PlanWaypoint read_waypoint(const Json& json, const std::string& at, std::vector<
   take(f.boolean("height_search"), w.height_search);
   f.finish();
   return w;
+}
+
+std::optional<NetworkId> read_anchor(const Json& id, const std::string& at, std::vector<FieldError>& errors) {
+  const auto parsed = id.is_string()
+                          ? parse_network_id(id.get<std::string>())
+                          : Result<NetworkId>(make_error(Errc::invalid_argument, "must be a text"));
+  if (parsed) return parsed.value();
+  errors.push_back({at, "bad_id", parsed.error().message});
+  return std::nullopt;
+}
+
+void read_target(const Json& json, const std::string& at, std::map<NetworkId, double>& targets,
+                 std::vector<FieldError>& errors) {
+  Fields f(json, at, errors);
+  if (!f.is_object()) return;
+  const Json* id = f.child("network_id");
+  const auto anchor = read_anchor(id == nullptr ? Json() : *id, at + "/network_id", errors);
+  const auto sigma_m = f.number("target_sigma_m", k_min_target_m, k_max_target_m, true);
+  f.finish();
+  if (anchor && sigma_m && !targets.emplace(*anchor, *sigma_m).second)
+    errors.push_back({at + "/network_id", "duplicate", to_string(*anchor) + " has a target already"});
 }
 
 template <class F>
@@ -162,6 +184,9 @@ Ordered document_json(const Plan& plan) {
   out["settings"] = settings_json(plan.settings);
   out["expected_anchors"] = Ordered::array();
   for (const auto id : plan.expected_anchors) out["expected_anchors"].push_back(to_string(id));
+  out["anchor_targets"] = Ordered::array();
+  for (const auto& [id, sigma_m] : plan.anchor_target_sigma_m)
+    out["anchor_targets"].push_back({{"network_id", to_string(id)}, {"target_sigma_m", sigma_m}});
   out["waypoints"] = Ordered::array();
   for (const auto& w : plan.waypoints) {
     out["waypoints"].push_back({{"lon", w.at.lon_deg},
@@ -213,13 +238,10 @@ Plan read_plan(const Json& body, std::vector<FieldError>& errors) {
   if (const Json* fence = f.child("fence")) plan.fence = read_polygon(*fence, "/fence", errors);
   if (const Json* settings = f.child("settings")) read_settings(*settings, plan.settings, errors);
   each(f, "expected_anchors", k_max_anchors, [&](const Json& id, const std::string& at) {
-    const auto parsed = id.is_string()
-                            ? parse_network_id(id.get<std::string>())
-                            : Result<NetworkId>(make_error(Errc::invalid_argument, "must be a text"));
-    if (parsed)
-      plan.expected_anchors.push_back(parsed.value());
-    else
-      errors.push_back({at, "bad_id", parsed.error().message});
+    if (const auto anchor = read_anchor(id, at, errors)) plan.expected_anchors.push_back(*anchor);
+  });
+  each(f, "anchor_targets", k_max_anchors, [&](const Json& target, const std::string& at) {
+    read_target(target, at, plan.anchor_target_sigma_m, errors);
   });
   each(f, "waypoints", k_max_waypoints, [&](const Json& waypoint, const std::string& at) {
     plan.waypoints.push_back(read_waypoint(waypoint, at, errors));

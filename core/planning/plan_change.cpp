@@ -91,6 +91,22 @@ std::vector<NetworkId> not_in(const std::vector<NetworkId>& of, const std::vecto
   return out;
 }
 
+using Targets = std::map<NetworkId, double>;
+std::vector<TargetChange> changed_targets(const Targets& before, const Targets& after) {
+  const auto of = [](const Targets& targets, NetworkId anchor) {
+    const auto it = targets.find(anchor);
+    return it == targets.end() ? std::nullopt : std::optional(it->second);
+  };
+  Targets either = before;
+  either.insert(after.begin(), after.end());
+  std::vector<TargetChange> out;
+  for (const auto& [anchor, ignored] : either) {
+    const auto was_m = of(before, anchor), is_m = of(after, anchor);
+    if (was_m != is_m) out.push_back({anchor, was_m, is_m});
+  }
+  return out;
+}
+
 }  // namespace
 
 bool same_waypoint(const PlanWaypoint& a, const PlanWaypoint& b) {
@@ -116,6 +132,7 @@ PlanChange plan_change(const Plan& before, const Plan& after, std::size_t flown)
   compare_no_fly(before, after, out.areas);
   out.anchors_added = not_in(after.expected_anchors, before.expected_anchors);
   out.anchors_removed = not_in(before.expected_anchors, after.expected_anchors);
+  out.targets = changed_targets(before.anchor_target_sigma_m, after.anchor_target_sigma_m);
   return out;
 }
 

@@ -35,11 +35,17 @@ struct AreaChange {
   std::optional<std::size_t> before, after;  ///< index of a no-fly area
 };
 
+struct TargetChange {
+  NetworkId anchor{};
+  std::optional<double> before_m, after_m;  ///< absent: the target of the settings
+};
+
 /// What two revisions of a plan differ in, settings apart.
 struct PlanChange {
   std::vector<WaypointChange> waypoints;  ///< in the order of the flight
   std::vector<AreaChange> areas;
   std::vector<NetworkId> anchors_added, anchors_removed;
+  std::vector<TargetChange> targets;  ///< of anchors with one of their own, before or after; in order of ids
   /// First waypoint of the plan after that is not one of, or before one of, the first `flown` of the plan
   /// before.
   std::size_t next{};

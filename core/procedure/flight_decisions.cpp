@@ -6,6 +6,15 @@
 #include "core/procedure/why_not_done.hpp"
 
 namespace anchord::procedure {
+namespace {
+
+/// Of an anchor: what was done by one is done by the other.
+bool same_aim(const ExitRule& a, const ExitRule& b) {
+  return a.target_sigma_m == b.target_sigma_m && a.gdop_root == b.gdop_root &&
+         a.min_iterations == b.min_iterations && a.max_iterations == b.max_iterations;
+}
+
+}  // namespace
 
 /// Done is not reached: a limit of points, time or battery ends an anchor too.
 std::string FlightEngine::outcome(const std::string& which) const {
@@ -35,14 +44,15 @@ void FlightEngine::assess_anchors(double now_s, std::span<const Estimate> estima
       progress.sigma_m = position_sigma_m(*estimate);
       progress.gdop_root = estimate->gdop;
     }
-    if (const auto exit = exit_of(setup_.exit, progress)) {
+    const auto rule = setup_.exit_rule(task.id);
+    if (const auto exit = exit_of(rule, progress)) {
       task.done = true;
       task.reached = exit->reached;
       task.why = exit->reason;
       report(now_s, exit->reached ? EventLevel::info : EventLevel::warning, "anchor.done",
              to_string(task.id) + ": " + exit->reason);
     } else {
-      task.why = why_not_done(estimate, measured_at_[task.id], setup_.exit);
+      task.why = why_not_done(estimate, measured_at_[task.id], rule);
     }
   }
 }
@@ -83,7 +93,7 @@ planning::NextPointInput FlightEngine::point_input(std::span<const Estimate> est
     planning::PlannedAnchor anchor;
     anchor.name = to_string(task.id);
     anchor.weight = weight_of(task);
-    if (setup_.exit.target_sigma_m) anchor.target_m = *setup_.exit.target_sigma_m;
+    if (const auto wanted_m = setup_.exit_rule(task.id).target_sigma_m) anchor.target_m = *wanted_m;
     const auto it = std::find_if(estimates.begin(), estimates.end(),
                                  [&](const Estimate& e) { return e.anchor == task.id && e.best; });
     if (it == estimates.end()) {
@@ -169,16 +179,14 @@ bool FlightEngine::end_work(double now_s, NetworkId anchor, AnchorOrder order, c
 
 void FlightEngine::change_plan(double now_s, FlightSetup setup, std::size_t waypoint,
                                const std::string& why) {
-  const ExitRule &was = setup_.exit, &is = setup.exit;
-  const bool other_aim = was.target_sigma_m != is.target_sigma_m || was.gdop_root != is.gdop_root ||
-                         was.min_iterations != is.min_iterations || was.max_iterations != is.max_iterations;
-  setup_ = std::move(setup);
+  const FlightSetup was = std::exchange(setup_, std::move(setup));
   state_.waypoint = waypoint;
   point_task_.reset();
   asked_.reset();
   answer_.reset();
   for (auto& task : state_.anchors) {
-    if (!task.done || !other_aim || !task.ended_by.empty()) continue;
+    if (!task.done || !task.ended_by.empty() || same_aim(was.exit_rule(task.id), setup_.exit_rule(task.id)))
+      continue;
     task.done = task.reached = false;
     task.why = "assessed again at the next point: the plan was changed";
   }

@@ -58,6 +58,7 @@ Result<FlightSetup> flight_setup(const Plan& plan, const Eigen::Vector3d& home_m
   out.exit.min_iterations = s.min_iterations;
   out.exit.max_iterations = s.max_iterations;
   out.exit.target_sigma_m = s.target_sigma_m;
+  out.anchor_target_sigma_m = plan.anchor_target_sigma_m;
   out.exit.gdop_root = s.target_gdop;
   out.exit.max_s = s.max_flight_s;
   out.exit.min_battery = s.min_battery;
@@ -69,6 +70,13 @@ Result<FlightSetup> flight_setup(const Plan& plan, const Eigen::Vector3d& home_m
   p.flight_time_cost = p.rule != planning::Rule::dissertation;
   p.speed_mps = s.speed_mps;
   p.dwell_s = s.dwell_s;
+  return out;
+}
+
+ExitRule FlightSetup::exit_rule(NetworkId anchor) const {
+  ExitRule out = exit;
+  if (const auto own = anchor_target_sigma_m.find(anchor); own != anchor_target_sigma_m.end())
+    out.target_sigma_m = own->second;
   return out;
 }
 

@@ -26,6 +26,7 @@ struct FlightSetup {
   Settings settings;
   SafetyLimits limits;
   ExitRule exit;
+  std::map<NetworkId, double> anchor_target_sigma_m{};  ///< of anchors that have one of their own
   planning::NextPointOptions planner;
   Wgs84 origin{};
   Eigen::Vector3d middle_m{
@@ -38,6 +39,9 @@ struct FlightSetup {
   double arrive_believed_m = 1.5;                   ///< the autopilot must think so as well, roughly
   double home_arrive_m = 1.5, home_arrive_mps = 1;  ///< landing does not wait for centimetres
   bool decides_apart{false};  ///< the next point is computed by whoever drives: take_point_task()
+
+  /// When the work on this anchor ends: `exit`, with its own target where it has one.
+  ExitRule exit_rule(NetworkId anchor) const;
 };
 
 /// errors  invalid_argument: no waypoint, plan nowhere, settings

@@ -203,14 +203,21 @@ TEST_F(PlanInFlight, OtherTargetsAndAnchorsCountAtOnce) {
   edit([](Json& plan) {
     plan["settings"]["target_sigma_m"] = 0.02;
     plan["expected_anchors"] = {"0x6a21"};
+    plan["anchor_targets"] = {{{"network_id", "0x6a21"}, {"target_sigma_m", 0.015}}};
   });
   const Json d = difference();
   ASSERT_EQ(d["settings"].size(), 1u) << d["settings"];
   EXPECT_EQ(d["settings"][0]["name"], "target_sigma_m");
   EXPECT_EQ(d["settings"][0]["after"], 0.02);
   EXPECT_EQ(d["anchors_added"], Json::array({"0x6a21"}));
+  EXPECT_EQ(d["anchor_targets"],
+            Json::parse(R"([{"network_id":"0x6a21","before":null,"after":0.015}])"));
   ASSERT_EQ(take(lease, 2).status, 200);
   EXPECT_EQ(procedure()["target_sigma_m"], 0.02);
+  const double end_s = drone_->now + 60;
+  while (procedure()["anchors"].empty() && drone_->now < end_s) measure(1);
+  for (const auto& task : procedure()["anchors"])
+    EXPECT_EQ(task["target_sigma_m"], task["network_id"] == "0x6a21" ? 0.015 : 0.02) << task;
 }
 
 TEST_F(PlanInFlight, APersonEndsTheWorkOnAnAnchorAndTakesThatBack) {

@@ -7,22 +7,11 @@ import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { after, before, test } from 'node:test';
 import { Contract, checked } from './contract.mjs';
+import { endless, quick } from './learning_bodies.mjs';
 import { binary, eventually, root, startServer } from './server.mjs';
 
 const contract = new Contract();
 let server, call;
-
-// A grid that takes minutes: whatever interrupts it does so half-way.
-const values = (n, from, step) => Array.from({ length: n }, (_, i) => Number((from * step ** i).toPrecision(6)));
-const endless = {
-  task: 'nlos_id',
-  dataset: 'set',
-  methods: ['svm'],
-  cv: { folds: 4, seed: 7 },
-  importance: false,
-  grid: { svm: { c: values(90, 0.1, 1.1), gamma: values(90, 0.001, 1.1) } },
-};
-const quick = { task: 'nlos_id', dataset: 'set', methods: ['logistic', 'random_forest'], cv: { folds: 4, seed: 7 } };
 
 /** Processes of the server's worker. */
 function workersOf(pid) {

@@ -86,5 +86,20 @@ TEST(PlanChange, NamesTheAnchorsThatComeAndGo) {
   EXPECT_EQ(change.anchors_removed, std::vector<NetworkId>{{1}});
 }
 
+TEST(PlanChange, NamesTheAnchorsWhoseTargetDiffers) {
+  Plan before, after;
+  before.anchor_target_sigma_m = {{{1}, 0.02}, {{2}, 0.03}, {{4}, 0.1}};
+  after.anchor_target_sigma_m = {{{2}, 0.04}, {{3}, 0.05}, {{4}, 0.1}};
+  const auto targets = plan_change(before, after, 0).targets;
+  ASSERT_EQ(targets.size(), 3u);
+  EXPECT_EQ(targets[0].anchor, NetworkId{1});
+  EXPECT_EQ(targets[0].before_m, 0.02);
+  EXPECT_EQ(targets[0].after_m, std::nullopt);
+  EXPECT_EQ(targets[1].before_m, 0.03);
+  EXPECT_EQ(targets[1].after_m, 0.04);
+  EXPECT_EQ(targets[2].anchor, NetworkId{3});
+  EXPECT_EQ(targets[2].before_m, std::nullopt);
+}
+
 }  // namespace
 }  // namespace anchord::planning

@@ -488,6 +488,34 @@ TEST(FlightEngine, EveryExpectedAnchorIsDoneOnlyWhenItIs) {
   }
 }
 
+TEST(FlightEngine, AnAnchorIsDoneAtItsOwnTargetWhereItHasOne) {
+  Estimate estimate;
+  estimate.anchor = k_anchor;
+  estimate.verdict = Verdict::ok;
+  estimate.best.emplace();
+  estimate.best->position.m = k_place + Vector3d(3, 2, 0);
+  estimate.best->covariance_m2 = Eigen::Matrix3d::Identity() * (0.04 * 0.04 / 3);  // sigma 0.04 m
+  estimate.best->probability = 1;
+  for (const auto& [own_m, reached] :
+       std::vector<std::pair<std::optional<double>, bool>>{{{}, true}, {0.02, false}, {0.06, true}}) {
+    auto given = setup();
+    given.exit.min_iterations = 1;
+    given.exit.target_sigma_m = own_m == 0.06 ? 0.03 : 0.05;
+    if (own_m) given.anchor_target_sigma_m = {{k_anchor, *own_m}};
+    given.anchor_target_sigma_m[NetworkId{0x6a22}] = 0.001;  // of another
+    Flown f(std::move(given));
+    ways().at(Step::ranging)(f);
+    f.hear();
+    f.feed({Trigger::sampled});
+    f.here();
+    f.engine.tick(f.now, std::vector{estimate});
+    const auto& task = f.engine.state().anchors[0];
+    EXPECT_EQ(task.reached, reached) << own_m.value_or(0) << ": " << task.why;
+    EXPECT_EQ(task.done, reached) << task.why;
+    if (!reached) EXPECT_NE(task.why.find("0.040 m, wanted 0.020 m"), std::string::npos) << task.why;
+  }
+}
+
 // From afar RSS does not change with the heading by more than its noise: the search would be flown for
 // nothing.
 TEST(FlightEngine, ATurnThatSeesNoLobeIsFollowedByNoHeightSearchUntilItIsNearer) {

@@ -36,6 +36,7 @@ export interface Plan {
   readonly building_height_m: number;
   readonly settings: Settings;
   readonly expected: readonly string[];
+  readonly targets: Readonly<Record<string, number>>; ///< sigma in metres of anchors with one of their own
   readonly waypoints: readonly Waypoint[];
   readonly rest: Readonly<Record<string, unknown>>; ///< what this page does not edit, kept as it came
 }
@@ -64,6 +65,7 @@ export const EMPTY: Plan = {
   building_height_m: BUILDING_HEIGHT_M,
   settings: {},
   expected: [],
+  targets: {},
   waypoints: [],
   rest: {},
 };
@@ -90,6 +92,7 @@ function plan_of(o: Record<string, unknown>): Plan {
     building_height_m,
     settings,
     expected_anchors,
+    anchor_targets,
     waypoints,
     created_at: _made,
     changed_at: _changed,
@@ -107,6 +110,12 @@ function plan_of(o: Record<string, unknown>): Plan {
     settings: obj(settings) ?? {},
     rest,
     expected: Array.isArray(expected_anchors) ? expected_anchors.filter((a): a is string => typeof a === 'string') : [],
+    targets: Object.fromEntries(
+      list(anchor_targets).flatMap((t) => {
+        const sigma_m = num(t.target_sigma_m);
+        return sigma_m === null ? [] : [[str(t.network_id), sigma_m]];
+      }),
+    ),
     waypoints: list(waypoints).map((w) => ({
       lon: num(w.lon) ?? 0,
       lat: num(w.lat) ?? 0,
@@ -132,6 +141,7 @@ export const body_of = (p: Plan): Wire<'PlanBody'> =>
     building_height_m: p.building_height_m,
     settings: p.settings,
     expected_anchors: p.expected,
+    anchor_targets: Object.entries(p.targets).map(([network_id, target_sigma_m]) => ({ network_id, target_sigma_m })),
     waypoints: p.waypoints,
   }) as Wire<'PlanBody'>;
 

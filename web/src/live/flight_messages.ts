@@ -44,6 +44,7 @@ export interface AnchorTask {
   readonly reached: boolean; // its accuracy; done without it: given up, or accepted by a person
   readonly ended_by: string; // the person who accepted it or gave it up; empty: nobody did
   readonly accepted: boolean;
+  readonly target_sigma_m: number | null; // its own, or that of the plan
   readonly why: string;
   readonly iterations: number;
   readonly at_edge: boolean;
@@ -226,6 +227,7 @@ export function procedure(v: unknown): ProcedureMsg | null {
       reached: a.reached === true,
       ended_by: str(a.ended_by),
       accepted: a.accepted === true,
+      target_sigma_m: num(a.target_sigma_m),
       why: str(a.why),
       iterations: count(a.iterations),
       at_edge: a.height_at_edge === true,

@@ -95,7 +95,8 @@ export interface Goal {
   readonly limit_m: number;
 }
 export function goal_of(e: EstimateMsg | null, p: ProcedureMsg | null | undefined): Goal | null {
-  if (e && p?.target_sigma_m != null && task_of(p, e.anchor)) return { of: 'sigma', limit_m: p.target_sigma_m };
+  const wanted_m = e && task_of(p, e.anchor)?.target_sigma_m;
+  if (wanted_m != null) return { of: 'sigma', limit_m: wanted_m };
   const gate = e?.gates.find((g) => g.name === 'goal_h95_m');
   return gate?.limit == null ? null : { of: 'h95', limit_m: gate.limit };
 }

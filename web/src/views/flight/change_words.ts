@@ -4,6 +4,7 @@ import { fixed } from '../../ui/format';
 
 type Waypoint = PlanDifference['waypoints'][number];
 type Area = PlanDifference['areas'][number];
+type Target = PlanDifference['anchor_targets'][number];
 type Setting = PlanDifference['settings'][number];
 
 const AREA: Record<Area['area'], string> = { outline: 'Outline', fence: 'Fence', no_fly: 'No-fly area' };
@@ -54,11 +55,17 @@ function setting_words({ name, before, after }: Setting): string {
   return `${plain.charAt(0).toUpperCase()}${plain.slice(1)} ${word(before)}, now ${word(after)}`;
 }
 
+const target_words = ({ network_id, before, after }: Target): string => {
+  const word = (v: number | null): string => (v === null ? 'that of the plan' : `${v} m`);
+  return `Target sigma of ${network_id}: ${word(before)}, now ${word(after)}`;
+};
+
 export const difference_lines = (d: PlanDifference): string[] => [
   ...d.waypoints.map(waypoint_words),
   ...d.areas.map(area_words),
   ...(d.anchors_added.length ? [`Expected as well: ${d.anchors_added.join(', ')}`] : []),
   ...(d.anchors_removed.length ? [`No longer expected: ${d.anchors_removed.join(', ')}`] : []),
+  ...d.anchor_targets.map(target_words),
   ...d.settings.map(setting_words),
 ];
 export const next_words = (d: PlanDifference): string =>

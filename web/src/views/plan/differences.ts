@@ -51,6 +51,8 @@ const corners_words = (mine: readonly Corner[], theirs: readonly Corner[]): read
   return [words(mine, theirs), words(theirs, mine)];
 };
 
+const target_word = (sigma_m: number | undefined): string => (sigma_m === undefined ? 'that of the plan' : `${sigma_m}`);
+
 /// At most fifteen lines; the last says how many more there are.
 export function differences(mine: Plan, theirs: Plan): Difference[] {
   const out: Difference[] = [],
@@ -82,6 +84,8 @@ export function differences(mine: Plan, theirs: Plan): Difference[] {
       word(theirs.settings[key] ?? SETTINGS[key].default),
     );
   put('Expected anchors', mine.expected.join(', ') || 'none', theirs.expected.join(', ') || 'none');
+  for (const id of Object.keys({ ...mine.targets, ...theirs.targets }).sort())
+    put(`Target sigma of ${id}, m`, target_word(mine.targets[id]), target_word(theirs.targets[id]));
   put('Waypoints', String(mine.waypoints.length), String(theirs.waypoints.length));
   for (let i = 0; i < Math.max(mine.waypoints.length, theirs.waypoints.length); i++) {
     const [a, b] = [mine.waypoints[i], theirs.waypoints[i]];

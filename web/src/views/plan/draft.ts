@@ -115,12 +115,14 @@ export function plan_from_draft(kept: unknown): Plan | null {
     !obj(o.rest)
   )
     return null;
-  const expected = Array.isArray(o.expected) && o.expected.every((a) => typeof a === 'string') ? o.expected : []; // older drafts have none
+  const expected = Array.isArray(o.expected) && o.expected.every((a) => typeof a === 'string') ? o.expected : [], // older drafts have none of
+    kept_targets = obj(o.targets) ?? {}, // either
+    targets = Object.values(kept_targets).every((m) => num(m) !== null) ? kept_targets : {};
   return cornered(o.outline) &&
     cornered(o.fence) &&
     cornered(o.waypoints) &&
     Array.isArray(o.no_fly) &&
     o.no_fly.every(cornered)
-    ? ({ ...o, expected } as unknown as Plan)
+    ? ({ ...o, expected, targets } as unknown as Plan)
     : null;
 }

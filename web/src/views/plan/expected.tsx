@@ -1,10 +1,12 @@
-/// Anchors that the flight should meet: the flight's progress and its report count against them. Those whose place is known are on the map.
+/// Anchors that the flight should meet: the flight's progress and its report count against them. Those whose place is known are on the map. Each may have
+/// a target of its own, also one that is not expected.
 import { useState } from 'preact/hooks';
 import type { AnchorRow } from '../../api/anchors';
-import type { Plan } from '../../api/plans';
+import { setting, SETTINGS, type Plan } from '../../api/plans';
 import { enu_from_geodetic, type Geodetic } from '../../map/enu';
 import { fixed } from '../../ui/format';
 import { to_m } from './draft';
+import { Cell } from './points';
 
 const REACH_M = 60; ///< within which the server's planner counts on ranges
 export interface Placed {
@@ -51,6 +53,16 @@ export function Expected({
       ? `${points.filter(([e, n]) => Math.hypot(e - at.e, n - at.n) <= REACH_M).length} of ${points.length}`
       : '–';
   };
+  const rows = [...plan.expected, ...Object.keys(plan.targets).filter((id) => !plan.expected.includes(id))];
+  const { minimum, maximum } = SETTINGS.target_sigma_m;
+  const aim = (id: string, sigma_m: number | null): void => {
+    const { [id]: _old, ...others } = plan.targets;
+    change({ ...plan, targets: sigma_m === null ? others : { ...others, [id]: sigma_m } });
+  };
+  const forget = (id: string): void => {
+    const { [id]: _old, ...targets } = plan.targets;
+    change({ ...plan, expected: plan.expected.filter((x) => x !== id), targets });
+  };
   const add = (): void => {
     if (address && !plan.expected.includes(address)) change({ ...plan, expected: [...plan.expected, address] });
     set_text('');
@@ -62,7 +74,7 @@ export function Expected({
         <span class="meta">{plan.expected.length}</span>
       </div>
       {plan.expected.length === 0 && <p class="why">None is named: the flight measures every anchor in range.</p>}
-      {plan.expected.length > 0 && (
+      {rows.length > 0 && (
         <table class="tbl">
           <caption class="sr">Anchors that the flight should meet</caption>
           <thead>
@@ -72,25 +84,45 @@ export function Expected({
               <th scope="col" class="num">
                 Points within {fixed(REACH_M, 0)} m
               </th>
+              <th scope="col">Target σ, m</th>
               <th scope="col">
                 <span class="sr">Change</span>
               </th>
             </tr>
           </thead>
           <tbody>
-            {plan.expected.map((id) => (
+            {rows.map((id) => (
               <tr key={id}>
                 <th scope="row">
                   {known.get(id)?.name || id}
                   {known.get(id)?.name ? <span class="mut"> {id}</span> : ''}
                 </th>
-                <td>{places.has(id) ? 'published' : <span class="mut">not yet</span>}</td>
+                <td>
+                  {!plan.expected.includes(id) ? (
+                    <span class="mut">not expected</span>
+                  ) : places.has(id) ? (
+                    'published'
+                  ) : (
+                    <span class="mut">not yet</span>
+                  )}
+                </td>
                 <td class="num">{reach(id)}</td>
+                <td>
+                  <Cell
+                    label={`Target sigma of ${id}, metres`}
+                    value={plan.targets[id] ?? null}
+                    decimals={3}
+                    min={minimum}
+                    max={maximum}
+                    empty={fixed(setting(plan, 'target_sigma_m'), 3)}
+                    set={(v) => aim(id, v)}
+                  />
+                </td>
                 <td class="acts">
                   <button
                     class="btn small"
                     aria-label={`Do not expect ${id}`}
-                    onClick={() => change({ ...plan, expected: plan.expected.filter((x) => x !== id) })}
+                    onClick={() => forget(id)}
                   >
                     ×
                   </button>

@@ -12,7 +12,7 @@ interface Props {
 }
 
 /// A number that is taken when it is one: half-typed text changes nothing.
-function Cell({
+export function Cell({
   label,
   value,
   set,
