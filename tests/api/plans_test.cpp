@@ -78,6 +78,9 @@ TEST_F(Plans, EverythingWrongIsNamedAtOnce) {
   plan["waypoints"][1]["height_above_ground_m"] = -4;
   plan["settings"]["speed"] = 3;
   plan["outline"]["type"] = "Point";
+  plan["anchor_targets"] = Json::parse(R"([{"network_id":"0x6a21","target_sigma_m":0.02},
+    {"network_id":"0x6a21","target_sigma_m":0.03},{"network_id":"left","target_sigma_m":0.03},
+    {"network_id":"0x6a22","target_sigma_m":0},{"network_id":"0x6a23"}])");
   const auto answer = post("/api/v1/plans", plan.dump());
   ASSERT_EQ(answer.status, 422);
   std::set<std::string> pointers;
@@ -86,6 +89,8 @@ TEST_F(Plans, EverythingWrongIsNamedAtOnce) {
   EXPECT_TRUE(pointers.count("/waypoints/1/height_above_ground_m")) << answer.body;
   EXPECT_TRUE(pointers.count("/settings/speed")) << answer.body;
   EXPECT_TRUE(pointers.count("/outline")) << answer.body;
+  for (const char* where : {"1/network_id", "2/network_id", "3/target_sigma_m", "4/target_sigma_m"})
+    EXPECT_TRUE(pointers.count(std::string("/anchor_targets/") + where)) << answer.body;
 }
 
 TEST_F(Plans, ValidateTellsWhatIsWrongAndWhatTheFlightWouldBring) {

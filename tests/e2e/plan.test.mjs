@@ -111,12 +111,17 @@ test('waypoints are spaced evenly and made denser, judged while they are drawn, 
   await id('predicted-of').selectOption('gdop');
   await id('expect-address').fill('6A77');
   await id('expect').click();
+  const own = id('expected').getByLabel('Target sigma of 0x6a77, metres');
+  assert.equal(await own.getAttribute('placeholder'), '0.050', 'that of the plan, until it has one');
+  await own.fill('0.02');
+  await own.press('Tab');
   await id('save').click();
   await id('plan')
     .getByText(`revision ${before.revision + 1}`)
     .waitFor();
   const kept = await stored(),
     check = await post(`/api/v1/plans/${before.id}/validate`, {});
+  assert.deepEqual(kept.anchor_targets, [{ network_id: '0x6a77', target_sigma_m: 0.02 }]);
   assert.deepEqual([kept.expected_anchors, kept.waypoints.length], [['0x6a77'], n + 2]);
   await eventually(
     "the page's forecast is the server's",
