@@ -16,6 +16,7 @@ const difference = (more: Partial<PlanDifference>): PlanDifference => ({
   areas: [],
   anchors_added: [],
   anchors_removed: [],
+  anchor_targets: [],
   settings: [],
   forecast_before_s: time,
   forecast_after_s: time,
@@ -35,6 +36,7 @@ test('a change is told in sentences with their units, and what is passed is said
         { area: 'fence', change: 'moved', before: null, after: null },
       ],
       anchors_added: ['0x6a21'],
+      anchor_targets: [{ network_id: '0x6a21', before: null, after: 0.015 }],
       settings: [
         { name: 'target_sigma_m', before: 0.05, after: 0.02 },
         { name: 'min_battery', before: 0.3, after: 0.4 },
@@ -50,6 +52,7 @@ test('a change is told in sentences with their units, and what is passed is said
     'No-fly area 1 added',
     'Fence changed',
     'Expected as well: 0x6a21',
+    'Target sigma of 0x6a21: that of the plan, now 0.015 m',
     'Target sigma 0.05 m, now 0.02 m',
     'Min battery 30 %, now 40 %',
     'Turn on, now off',

@@ -24,6 +24,8 @@ describe('an anchor is done', () => {
     expect(as_shown(anchor('0x1', 'converged'), p).status).toBe('converged');
     expect(as_shown(anchor('0x2', 'converged'), p).status).toBe('estimating');
     expect(goal_of(anchor('0x2', 'converged'), p)).toEqual({ of: 'sigma', limit_m: 0.03 });
+    const own = flight([{ ...task('0x2', false, false), target_sigma_m: 0.01 }]);
+    expect(goal_of(anchor('0x2', 'converged'), own)).toEqual({ of: 'sigma', limit_m: 0.01 });
   });
   it('never when its time ran out, nor when the flight ended before: given up is not green', () => {
     for (const p of [flight([task('0x1', true, false)]), flight([task('0x1', false, false)], 'aborted')]) {

@@ -95,7 +95,8 @@ export interface Goal {
   readonly limit_m: number;
 }
 export function goal_of(e: EstimateMsg | null, p: ProcedureMsg | null | undefined): Goal | null {
-  const wanted_m = e && task_of(p, e.anchor)?.target_sigma_m;
+  const task = e && task_of(p, e.anchor),
+    wanted_m = task && (task.target_sigma_m ?? p?.target_sigma_m);
   if (wanted_m != null) return { of: 'sigma', limit_m: wanted_m };
   const gate = e?.gates.find((g) => g.name === 'goal_h95_m');
   return gate?.limit == null ? null : { of: 'h95', limit_m: gate.limit };
