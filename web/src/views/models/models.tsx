@@ -16,7 +16,7 @@ import { Promote } from './promote';
 import { Rules } from './rules';
 import { RunTable } from './run_table';
 import { task, useModels } from './use_models';
-import { method_words, TASK_WORDS } from './words';
+import { method_words, TASK_WORDS, why_words } from './words';
 
 const rules_open = signal(false);
 
@@ -220,7 +220,7 @@ function Numbers({ run, numbers }: { run: Run; numbers: RunNumbers }) {
       {run.why && (
         <section class="cell-p wide">
           <p class="why">
-            {run.why}
+            {why_words(run.why)}
             {run.nll !== null &&
               `. Mean negative log-likelihood on held-out places ${fixed(run.nll, 3)}, constants ${fixed(run.nll_constants, 3)}.`}
           </p>

@@ -23,6 +23,7 @@ const METHODS: Record<string, string> = {
   multivariate: 'Multivariate polynomial',
   polynomial: 'Polynomial',
   mixture: 'Averaged logits',
+  average: 'Forest and SVM, averaged',
   auto: 'Automatic',
   none: 'No correction',
   raw: 'No correction',
@@ -35,11 +36,14 @@ export function method_words(m: string | null): string {
   return parts
     ? [
         plain_words(parts[1]!),
-        ...(parts[2] ? parts[2].split(',').map((s) => s.trim().replace('=', ' ')) : []),
+        ...(parts[2] ? parts[2].split(',').map((s) => s.trim().replace('=', ' ').replaceAll('_', ' ')) : []),
         ...(parts[3] ? [parts[3]] : []),
       ].join(', ')
     : plain_words(m);
 }
+/// Why a run chose what it chose, with the candidate in words as well.
+export const why_words = (why: string): string =>
+  why.replace(/\w+\([^()]*\)(?: on \d+ features?)?/g, method_words).replace(/^./, (c) => c.toUpperCase());
 interface Named {
   readonly id: string;
   readonly method: string | null;
