@@ -10,7 +10,7 @@ describe('the name of a method', () => {
     expect(method_words('svm(c=3,gamma=0.1)')).toBe('Support vector machine, c 3, gamma 0.1'));
   it('has no underscore where a setting has one', () =>
     expect(method_words('average(c=3, leaf_share=0.03) on 7 features')).toBe(
-      'Forest and SVM, averaged, c 3, leaf share 0.03, 7 features',
+      'Logistic, SVM and forest averaged, c 3, leaf share 0.03, 7 features',
     ));
   it('is in words in the reason of its choice too', () =>
     expect(why_words('lowest log loss: logistic(c=3) on 3 features 0.158 over 2 candidates')).toBe(
