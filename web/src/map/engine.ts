@@ -7,6 +7,7 @@ import View from 'ol/View.js';
 import { to_px, type Camera } from './camera';
 import { magnification } from './enu';
 import { read_palette, type Palette } from './palette';
+import { next_picture } from '../state/pace';
 import { interpolated } from '../state/scene';
 import { draw_fast, draw_slow, draw_top, mark_trail, trail_stands, type Content, type TrailMark } from './picture';
 
@@ -200,7 +201,7 @@ export function open_map(
     place = '';
   const frame = (t: number): void => {
     if (closed) return;
-    requestAnimationFrame(frame);
+    next_picture(frame);
     if (t - aimed_ms > 300) {
       aimed_ms = t;
       aim();
@@ -224,7 +225,7 @@ export function open_map(
     drawn = scene?.version ?? -1;
     last_ms = t;
   };
-  requestAnimationFrame(frame);
+  next_picture(frame);
   const resized = new ResizeObserver(() => {
     map.updateSize();
     fitted = null;

@@ -4,6 +4,7 @@ import * as f from '../live/flight_messages';
 import * as m from '../live/messages';
 import { age } from '../ui/format';
 import type { LinkState, LiveSink, LiveSource } from '../live/source';
+import { picture_begins, rest_ms } from './pace';
 import { Scene } from './scene';
 
 export const TOPICS = [
@@ -106,15 +107,18 @@ let dirty = false;
 let flush_timer: ReturnType<typeof setTimeout> | null = null;
 function touch(): void {
   dirty = true;
-  flush_timer ??= setTimeout(flush, 250);
+  flush_timer ??= setTimeout(flush, Math.max(250, rest_ms()));
 }
 function flush(): void {
   flush_timer = null;
-  if (dirty) tick.value++;
+  if (dirty) {
+    picture_begins();
+    tick.value++;
+  }
   dirty = false;
 }
 /// Ages move while nothing arrives, so the text looks at least once a second.
-setInterval(() => tick.value++, 1000);
+setInterval(touch, 1000);
 
 function upsert(list: readonly m.MissionMsg[], news: readonly m.MissionMsg[]): m.MissionMsg[] {
   const by_id = new Map(list.map((x) => [x.mission, x]));

@@ -1,0 +1,44 @@
+/// Pictures of a page that cannot keep up. The browser draws before it reads: while each picture takes half a second and the next is always due, what
+/// the socket brought waits, and is old when it is worked in. After a long picture the next one waits as long as it took: half of the time is for reading.
+const LONG_MS = 150,
+  LONGEST_REST_MS = 1000;
+
+/// When the next picture may begin. No DOM.
+export class Pace {
+  private begun_ms: number | null = null;
+  private free_ms = -Infinity;
+  begins(now_ms: number): void {
+    this.begun_ms ??= now_ms;
+  }
+  ends(now_ms: number): void {
+    if (this.begun_ms === null) return;
+    const took_ms = now_ms - this.begun_ms;
+    this.begun_ms = null;
+    if (took_ms > LONG_MS) this.free_ms = now_ms + Math.min(took_ms, LONGEST_REST_MS);
+  }
+  rest_ms(now_ms: number): number {
+    return Math.max(0, this.free_ms - now_ms);
+  }
+}
+
+const pace = new Pace(),
+  ended = new MessageChannel(); // a task of its own: it comes after style, layout and paint
+ended.port2.onmessage = () => pace.ends(performance.now());
+
+export const rest_ms = (): number => pace.rest_ms(performance.now());
+/// What is drawn follows from what was just changed, in the next frame.
+export function picture_begins(): void {
+  pace.begins(performance.now());
+  requestAnimationFrame(() => ended.port1.postMessage(null));
+}
+/// As requestAnimationFrame, once the page had time to read.
+export function next_picture(draw: (t_ms: number) => void): void {
+  const drawn = (t_ms: number): void => {
+      pace.begins(performance.now());
+      ended.port1.postMessage(null);
+      draw(t_ms);
+    },
+    wait_ms = rest_ms();
+  if (wait_ms > 0) setTimeout(() => requestAnimationFrame(drawn), wait_ms);
+  else requestAnimationFrame(drawn);
+}
