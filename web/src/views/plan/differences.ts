@@ -51,7 +51,8 @@ const corners_words = (mine: readonly Corner[], theirs: readonly Corner[]): read
   return [words(mine, theirs), words(theirs, mine)];
 };
 
-const target_word = (sigma_m: number | undefined): string => (sigma_m === undefined ? 'that of the plan' : `${sigma_m}`);
+const target_word = (sigma_m: number | undefined): string =>
+  sigma_m === undefined ? 'that of the plan' : `${sigma_m}`;
 
 /// At most fifteen lines; the last says how many more there are.
 export function differences(mine: Plan, theirs: Plan): Difference[] {

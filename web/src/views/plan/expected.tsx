@@ -119,11 +119,7 @@ export function Expected({
                   />
                 </td>
                 <td class="acts">
-                  <button
-                    class="btn small"
-                    aria-label={`Do not expect ${id}`}
-                    onClick={() => forget(id)}
-                  >
+                  <button class="btn small" aria-label={`Do not expect ${id}`} onClick={() => forget(id)}>
                     ×
                   </button>
                 </td>
