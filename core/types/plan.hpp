@@ -105,7 +105,8 @@ struct Plan {
   GeoPolygon fence;
   PlanSettings settings{};
   std::vector<NetworkId> expected_anchors;
-  std::map<NetworkId, double> anchor_target_sigma_m;  ///< of those that are not to reach settings.target_sigma_m
+  std::map<NetworkId, double>
+      anchor_target_sigma_m;  ///< of those that are not to reach settings.target_sigma_m
   std::vector<PlanWaypoint> waypoints;
   /// Of its site, as it is now: joined where a plan is checked, generated or flown, never kept with it.
   std::shared_ptr<const SiteStructure> structure{};

@@ -156,7 +156,8 @@ std::string aircraft(const Json& drone) {
   if (!drone.is_object()) return "";
   if (!flag(drone, "connected")) {
     const auto silent = number(drone, "silent_s");
-    return "Aircraft: NOT CONNECTED" + (silent ? ", silent for " + seconds(silent) + " s" : std::string(", never heard"));
+    return "Aircraft: NOT CONNECTED" +
+           (silent ? ", silent for " + seconds(silent) + " s" : std::string(", never heard"));
   }
   std::string out = "Aircraft: " + text(drone, "mode");
   out += flag(drone, "armed") ? ", ARMED" : ", DISARMED";

@@ -210,8 +210,7 @@ TEST_F(PlanInFlight, OtherTargetsAndAnchorsCountAtOnce) {
   EXPECT_EQ(d["settings"][0]["name"], "target_sigma_m");
   EXPECT_EQ(d["settings"][0]["after"], 0.02);
   EXPECT_EQ(d["anchors_added"], Json::array({"0x6a21"}));
-  EXPECT_EQ(d["anchor_targets"],
-            Json::parse(R"([{"network_id":"0x6a21","before":null,"after":0.015}])"));
+  EXPECT_EQ(d["anchor_targets"], Json::parse(R"([{"network_id":"0x6a21","before":null,"after":0.015}])"));
   ASSERT_EQ(take(lease, 2).status, 200);
   EXPECT_EQ(procedure()["target_sigma_m"], 0.02);
   const double end_s = drone_->now + 60;
