@@ -32,6 +32,11 @@ Result<FlightData> load_flight(MeasurementStore& store, const Mission& mission,
   MeasurementStore::Filter filter;
   filter.mission = mission.id;
   filter.limit = 10'000;
+  // A long flight is the largest thing in memory: it is not to be moved as it grows.
+  BOOST_OUTCOME_TRY(const auto n_fixes, store.count_fixes(mission.id));
+  BOOST_OUTCOME_TRY(const auto n_ranges, store.count_ranges(mission.id));
+  flight.fixes.reserve(n_fixes);
+  flight.ranges.reserve(n_ranges);
   do {
     if (canceled()) return make_error(Errc::canceled, "canceled");
     BOOST_OUTCOME_TRY(auto page, store.fixes(filter));
@@ -307,6 +312,31 @@ Result<Job> CalibrationService::submit(CalibrationRequest request) {
       });
 }
 
+/// Flights under the keys by which a profile tells its factors apart, while this lives. They are too large to
+/// be copied for that.
+class UnderKeys {
+ public:
+  UnderKeys(std::vector<FlightData>& flights, const std::vector<std::size_t>& members) {
+    for (const std::size_t i : members) {
+      FlightData& flight = flights[i];
+      renamed_.push_back({&flight, flight.mission.name});
+      flight.mission.name = KitProfiles::flight_key(flight.mission);
+      pointers_.push_back(&flight);
+    }
+  }
+  ~UnderKeys() {
+    for (auto& [flight, name] : renamed_) flight->mission.name = std::move(name);
+  }
+  UnderKeys(const UnderKeys&) = delete;
+  UnderKeys& operator=(const UnderKeys&) = delete;
+
+  const std::vector<const FlightData*>& pointers() const { return pointers_; }
+
+ private:
+  std::vector<std::pair<FlightData*, std::string>> renamed_;
+  std::vector<const FlightData*> pointers_;
+};
+
 /// All flights of one kit together, with what the kit's stored profile says about them.
 Result<void> CalibrationService::solve_kit(const CalibrationRequest& request, const FlightOptions& options,
                                            Solved& solved, const std::string& kit) {
@@ -321,12 +351,6 @@ Result<void> CalibrationService::solve_kit(const CalibrationRequest& request, co
     }
   }
   const auto members = solved.of_kit(kit);
-  std::vector<FlightData> named;
-  for (const std::size_t i : members) {
-    named.push_back(solved.flights[i]);
-    // Factors of a profile are told apart by this name.
-    named.back().mission.name = KitProfiles::flight_key(solved.flights[i].mission);
-  }
   if (request.flight_priors && options.origin) {
     procedure::FlightPriors told;
     for (const std::size_t i : members)
@@ -335,14 +359,13 @@ Result<void> CalibrationService::solve_kit(const CalibrationRequest& request, co
     of_kit.priors.merge(procedure::priors_in(told, EnuFrame(*options.origin)));
     solved.n_priors += of_kit.priors.size();
   }
-  std::vector<const FlightData*> pointers;
-  for (const auto& flight : named) pointers.push_back(&flight);
+  const UnderKeys keyed(solved.flights, members);
   KitProfile learned;
-  BOOST_OUTCOME_TRY(auto answers, solve_flights(pointers, of_kit, &learned));
+  BOOST_OUTCOME_TRY(auto answers, solve_flights(keyed.pointers(), of_kit, &learned));
   for (std::size_t k = 0; k < members.size(); ++k) {
     if (!believed(answers[k]))
       std::erase_if(learned.factors,
-                    [&](const ProfileFactor& f) { return f.flight == named[k].mission.name; });
+                    [&](const ProfileFactor& f) { return f.flight == keyed.pointers()[k]->mission.name; });
     solved.solutions[members[k]] = std::move(answers[k]);
   }
   if (!kit.empty()) {
@@ -353,7 +376,8 @@ Result<void> CalibrationService::solve_kit(const CalibrationRequest& request, co
   }
   if (request.iterations > 0 && !members.empty() && members.front() < request.missions.size() &&
       solved.evidence.course.empty()) {
-    BOOST_OUTCOME_TRY(solved.evidence.course, convergence_of(named.front(), of_kit, request.iterations));
+    BOOST_OUTCOME_TRY(solved.evidence.course,
+                      convergence_of(*keyed.pointers().front(), of_kit, request.iterations));
   }
   return boost::outcome_v2::success();
 }

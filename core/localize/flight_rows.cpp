@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <set>
 #include <tuple>
 
 #include "core/base/median.hpp"
@@ -79,10 +78,24 @@ void note_track(const FlightData& flight, const std::vector<std::string>& notes,
 
 using Between = std::map<std::pair<NetworkId, NetworkId>, std::vector<double>>;
 
+/// Of the ranges at `usable` those that repeat no earlier one: same time, radios, antenna and number. The
+/// first of each stays; in order.
+std::vector<std::size_t> without_repeats(const std::vector<Range>& ranges, std::vector<std::size_t> usable) {
+  const auto identity = [&](std::size_t i) {
+    const Range& r = ranges[i];
+    return std::tuple(r.time.ns, r.tag, r.antenna, r.anchor, r.seq);
+  };
+  std::ranges::stable_sort(usable, {}, identity);
+  const auto [from, to] = std::ranges::unique(usable, {}, identity);
+  usable.erase(from, to);
+  std::ranges::sort(usable);
+  return usable;
+}
+
 /// Ranges of the tags into `rows`, by anchor; those between anchors into what is returned.
 Between add_ranges(const FlightData& flight, const FlightOptions& options, FlightRows& rows) {
   std::map<NetworkId, AnchorRows> anchors;
-  std::set<std::tuple<std::int64_t, NetworkId, std::uint8_t, NetworkId, std::optional<std::uint64_t>>> seen;
+  std::vector<std::size_t> usable;
   Between between;
   for (std::size_t i = 0; i < flight.ranges.size(); ++i) {
     const Range& range = flight.ranges[i];
@@ -93,21 +106,28 @@ Between add_ranges(const FlightData& flight, const FlightOptions& options, Fligh
     }
     AnchorRows& anchor = anchors[range.anchor];
     std::string why = refusal(range, options);
-    const auto arm = lever_arm(flight.mission, range);
-    if (why.empty() && !arm) why = "unknown_tag";
-    if (why.empty() &&
-        !seen.insert({range.time.ns, range.tag, range.antenna, range.anchor, range.seq}).second) {
-      why = "duplicate";
-    }
-    if (why.empty()) {
-      anchor.rows.push_back({seconds_between(rows.epoch, range.time), range.distance_m, *arm, range.tag,
-                             range.antenna,
-                             i < flight.error_models.size() ? flight.error_models[i] : std::nullopt,
-                             range.rss_dbm ? range.rss_dbm : range.rx_dbm});
-      if (i < flight.received_m.size()) anchor.rows.back().received_m = flight.received_m[i];
-    } else {
+    if (why.empty() && !lever_arm(flight.mission, range)) why = "unknown_tag";
+    if (why.empty())
+      usable.push_back(i);
+    else
       ++anchor.refused[why];
-    }
+  }
+  std::map<NetworkId, std::size_t> n_usable, n_kept;
+  for (const std::size_t i : usable) ++n_usable[flight.ranges[i].anchor];
+  const auto kept = without_repeats(flight.ranges, std::move(usable));
+  for (const std::size_t i : kept) ++n_kept[flight.ranges[i].anchor];
+  for (const auto& [id, n] : n_usable) {
+    anchors[id].rows.reserve(n_kept[id]);
+    if (n > n_kept[id]) anchors[id].refused["duplicate"] = n - n_kept[id];
+  }
+  for (const std::size_t i : kept) {
+    const Range& range = flight.ranges[i];
+    auto& own = anchors[range.anchor].rows;
+    own.push_back({seconds_between(rows.epoch, range.time), range.distance_m,
+                   lever_arm(flight.mission, range).value(), range.tag, range.antenna,
+                   i < flight.error_models.size() ? flight.error_models[i] : std::nullopt,
+                   range.rss_dbm ? range.rss_dbm : range.rx_dbm});
+    if (i < flight.received_m.size()) own.back().received_m = flight.received_m[i];
   }
   for (const auto& [id, n] : flight.n_ranges_excluded) anchors[id].refused["excluded"] += n;
   for (auto& [id, anchor] : anchors) {

@@ -1,20 +1,13 @@
 // A flight of a million ranges leaves the server as NDJSON, CSV and GeoPackage: how long, how many bytes, and what its resident memory rises to.
 //   node tests/bench/exports.mjs [RANGES]        ANCHORD_BINARY names the server
 // Fails where memory rises by more than `most_mib`, or grows with the number of rows: a tenth of them is sent first.
-import { readFileSync, writeFileSync } from 'node:fs';
 import { startServer } from '../e2e/server.mjs';
+import { cpu_s, forget_peak, mib } from './process.mjs';
 
 const n_ranges = Number(process.argv[2] ?? 1_000_000),
   most_mib = 48,
   start_us = 1_777_889_472_000_000;
 const server = await startServer({ auth: 'off' });
-
-const mib = (field) =>
-  Number(new RegExp(`^${field}:\\s+(\\d+) kB`, 'm').exec(readFileSync(`/proc/${server.pid}/status`, 'utf8'))[1]) / 1024;
-const cpu_s = () => {
-  const fields = readFileSync(`/proc/${server.pid}/stat`, 'utf8').split(') ')[1].split(' ');
-  return (Number(fields[11]) + Number(fields[12])) / 100;
-};
 
 /** Rows at 100 Hz of four anchors, and a position five times a second. */
 function* bodies(mission, n) {
@@ -60,9 +53,9 @@ async function flight(n) {
 
 /** One export, thrown away as it comes: {bytes, s, cpu, rise_mib}. */
 async function sent(path) {
-  writeFileSync(`/proc/${server.pid}/clear_refs`, '5'); // the peak begins anew
-  const before = mib('VmRSS'),
-    cpu = cpu_s(),
+  forget_peak(server.pid);
+  const before = mib(server.pid, 'VmRSS'),
+    cpu = cpu_s(server.pid),
     begun = performance.now();
   const answer = await server.fetch(path);
   if (answer.status !== 200) throw new Error(`${path}: ${answer.status} ${await answer.text()}`);
@@ -71,9 +64,9 @@ async function sent(path) {
   return {
     bytes,
     s: (performance.now() - begun) / 1000,
-    cpu: cpu_s() - cpu,
-    rise: mib('VmHWM') - before,
-    peak: mib('VmHWM'),
+    cpu: cpu_s(server.pid) - cpu,
+    rise: mib(server.pid, 'VmHWM') - before,
+    peak: mib(server.pid, 'VmHWM'),
   };
 }
 
