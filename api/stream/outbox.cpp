@@ -174,33 +174,44 @@ std::shared_ptr<const std::string> Outbox::pick(std::int64_t now_us) {
   return unseen_.open(now_us) ? pick_content(now_us) : nullptr;
 }
 
-std::shared_ptr<const std::string> Outbox::pick_content(std::int64_t now_us) {
+/// The one that has waited longest since its last frame, so that no topic takes all that a slow client reads;
+/// of equals state before events before streams.
+Outbox::Queue* Outbox::next_queue(std::int64_t now_us) {
+  Queue* next = nullptr;
   for (const TopicClass cls : {TopicClass::state, TopicClass::event, TopicClass::stream}) {
     for (auto& [id, queue] : queues_) {
       if (info(queue.subscription.topic).cls != cls || !ready(queue, now_us)) continue;
-      queue.sent_us = now_us;
-      queue.due_us = now_us + queue.subscription.min_interval_us;
-      if (cls == TopicClass::state) {
-        auto frame = take_state(queue);
-        const auto bytes = static_cast<std::int64_t>(frame->size());
-        if (queue.subscription.deltas)
-          queue.due_us = std::max(queue.due_us, now_us + bytes * 1'000'000 / k_delta_bytes_per_s);
-        return frame;
-      }
-      if (cls == TopicClass::stream) drop_aged(queue, now_us);
-      if (!queue.replay.empty()) return take_messages(queue, queue.replay, true);
-      if (queue.gap_dropped > 0) {
-        auto frame = std::make_shared<const std::string>(
-            gap_frame(id, queue.gap_from, queue.gap_to, queue.gap_dropped));
-        queue.subscription.last_seq = queue.gap_to;
-        queue.gap_dropped = 0;
-        queue.sent_us = queue.due_us = INT64_MIN / 2;
-        return frame;
-      }
-      return take_messages(queue, queue.messages, cls == TopicClass::stream);
+      if (next == nullptr || queue.sent_us < next->sent_us) next = &queue;
     }
   }
-  return nullptr;
+  return next;
+}
+
+std::shared_ptr<const std::string> Outbox::pick_content(std::int64_t now_us) {
+  Queue* const picked = next_queue(now_us);
+  if (picked == nullptr) return nullptr;
+  Queue& queue = *picked;
+  const TopicClass cls = info(queue.subscription.topic).cls;
+  queue.sent_us = now_us;
+  queue.due_us = now_us + queue.subscription.min_interval_us;
+  if (cls == TopicClass::state) {
+    auto frame = take_state(queue);
+    const auto bytes = static_cast<std::int64_t>(frame->size());
+    if (queue.subscription.deltas)
+      queue.due_us = std::max(queue.due_us, now_us + bytes * 1'000'000 / k_delta_bytes_per_s);
+    return frame;
+  }
+  if (cls == TopicClass::stream) drop_aged(queue, now_us);
+  if (!queue.replay.empty()) return take_messages(queue, queue.replay, true);
+  if (queue.gap_dropped > 0) {
+    auto frame = std::make_shared<const std::string>(
+        gap_frame(queue.subscription.id, queue.gap_from, queue.gap_to, queue.gap_dropped));
+    queue.subscription.last_seq = queue.gap_to;
+    queue.gap_dropped = 0;
+    queue.sent_us = queue.due_us = INT64_MIN / 2;
+    return frame;
+  }
+  return take_messages(queue, queue.messages, cls == TopicClass::stream);
 }
 
 std::shared_ptr<const std::string> Outbox::take_state(Queue& queue) {

@@ -83,6 +83,7 @@ class Outbox {
   };
   bool ready(const Queue& queue, std::int64_t now_us) const;
   std::shared_ptr<const std::string> pick(std::int64_t now_us);
+  Queue* next_queue(std::int64_t now_us);
   std::shared_ptr<const std::string> pick_content(std::int64_t now_us);
   void drop_oldest_stream();
   void drop_front(Queue& queue);

@@ -227,6 +227,38 @@ TEST_F(OutboxRules, LagIsCountedBeyondTheWayAndNeverForWhoReportsNothing) {
   }
 }
 
+// A page on a weak machine: seventy frames a second would come, it works through twelve.
+TEST_F(OutboxRules, AClientThatReadsTwelveFramesASecondIsNearTheNewestInEveryTopic) {
+  const std::vector<Topic> topics{Topic::drone_pose, Topic::rtk_status, Topic::devices, Topic::ranges};
+  for (const Topic topic : topics) subscribe(topic, [](auto& s) { s.max_age_us = 1'000'000; });
+  std::deque<Json> unread;
+  std::map<std::uint64_t, std::vector<double>> ages_s;
+  std::uint64_t n_read = 0;
+  for (int step = 0; step < 2000; ++step) {  // 20 s
+    const double now_s = 10 + step * 0.01;
+    for (std::size_t i = 0; i < topics.size(); ++i) {
+      if (step % 6 != static_cast<int>(i)) continue;
+      topic_ = topics[i];
+      put(now_s, R"({"at":)" + std::to_string(now_s) + "}", "m");
+    }
+    for (auto& frame : read(now_s)) unread.push_back(std::move(frame));
+    // The first second at full speed, so that the server knows how long the way is.
+    for (bool once = step % 8 == 0; !unread.empty() && (step < 100 || once); once = false) {
+      const Json frame = std::move(unread.front());
+      unread.pop_front();
+      ASSERT_TRUE(outbox_.seen(++n_read, us(now_s + 0.005)));
+      if (now_s < 15 || frame["op"] != "data") continue;
+      const Json& newest = frame["data"].is_array() ? frame["data"].back() : frame["data"];
+      ages_s[frame["sub"]].push_back(now_s - newest["at"].get<double>());
+    }
+  }
+  ASSERT_EQ(ages_s.size(), topics.size()) << "no topic is left out";
+  for (auto& [sub, ages] : ages_s) {
+    EXPECT_GT(ages.size(), 20u) << sub << ": at least once a second";
+    EXPECT_LT(*std::ranges::max_element(ages), 1.0) << sub;
+  }
+}
+
 TEST_F(HubRules, RefusesToHaveSentWhatItDidNot) {
   auto client = connect();
   EXPECT_EQ(read(*client).size(), 1u);

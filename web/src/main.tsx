@@ -3,6 +3,7 @@ import { render } from 'preact';
 import { browser_environment } from './live/browser';
 import { LiveClient } from './live/client';
 import { follow_archive, load_missions } from './state/archive';
+import { pace_components } from './state/pace';
 import { me, refresh_me } from './state/session';
 import { connect, PARAMS, TOPICS } from './state/store';
 import { App } from './ui/app';
@@ -17,6 +18,7 @@ import './style/live.css';
 import './style/anchors.css';
 
 const client = new LiveClient(TOPICS, browser_environment(), PARAMS);
+pace_components();
 render(<App />, document.getElementById('app')!);
 addEventListener('keydown', on_key);
 /// Signed out, the stream rests until somebody signs in; the last picture stays.

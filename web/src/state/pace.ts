@@ -1,5 +1,7 @@
 /// Pictures of a page that cannot keep up. The browser draws before it reads: while each picture takes half a second and the next is always due, what
 /// the socket brought waits, and is old when it is worked in. After a long picture the next one waits as long as it took: half of the time is for reading.
+import { options } from 'preact';
+
 const LONG_MS = 150,
   LONGEST_REST_MS = 1000;
 
@@ -25,20 +27,30 @@ const pace = new Pace(),
   ended = new MessageChannel(); // a task of its own: it comes after style, layout and paint
 ended.port2.onmessage = () => pace.ends(performance.now());
 
-export const rest_ms = (): number => pace.rest_ms(performance.now());
-/// What is drawn follows from what was just changed, in the next frame.
-export function picture_begins(): void {
-  pace.begins(performance.now());
-  requestAnimationFrame(() => ended.port1.postMessage(null));
+/// Calls `draw` once the page had its time to read; another picture may end meanwhile and begin a rest of its own.
+function after_rest(draw: () => void): void {
+  const wait_ms = pace.rest_ms(performance.now());
+  if (wait_ms > 0) setTimeout(() => after_rest(draw), wait_ms);
+  else draw();
+}
+/// From now on components are drawn anew only when the page had time to read: many messages change something of some of them.
+export function pace_components(): void {
+  options.debounceRendering = (render) =>
+    queueMicrotask(() =>
+      after_rest(() => {
+        pace.begins(performance.now());
+        requestAnimationFrame(() => ended.port1.postMessage(null));
+        render();
+      }),
+    );
 }
 /// As requestAnimationFrame, once the page had time to read.
 export function next_picture(draw: (t_ms: number) => void): void {
-  const drawn = (t_ms: number): void => {
+  after_rest(() =>
+    requestAnimationFrame((t_ms) => {
       pace.begins(performance.now());
       ended.port1.postMessage(null);
       draw(t_ms);
-    },
-    wait_ms = rest_ms();
-  if (wait_ms > 0) setTimeout(() => requestAnimationFrame(drawn), wait_ms);
-  else requestAnimationFrame(drawn);
+    }),
+  );
 }

@@ -4,7 +4,6 @@ import * as f from '../live/flight_messages';
 import * as m from '../live/messages';
 import { age } from '../ui/format';
 import type { LinkState, LiveSink, LiveSource } from '../live/source';
-import { picture_begins, rest_ms } from './pace';
 import { Scene } from './scene';
 
 export const TOPICS = [
@@ -28,6 +27,7 @@ export const TOPICS = [
 /// A link that cannot keep up gets less, and nothing older.
 export const PARAMS = {
   'anchors.estimates': { max_hz: 2, deltas: true },
+  'drone.pose': { max_hz: 10 }, // between two of them the map moves it
   ranges: { max_age_s: 1 },
 } as const;
 
@@ -107,14 +107,11 @@ let dirty = false;
 let flush_timer: ReturnType<typeof setTimeout> | null = null;
 function touch(): void {
   dirty = true;
-  flush_timer ??= setTimeout(flush, Math.max(250, rest_ms()));
+  flush_timer ??= setTimeout(flush, 250);
 }
 function flush(): void {
   flush_timer = null;
-  if (dirty) {
-    picture_begins();
-    tick.value++;
-  }
+  if (dirty) tick.value++;
   dirty = false;
 }
 /// Ages move while nothing arrives, so the text looks at least once a second.
