@@ -115,8 +115,7 @@ try {
   }
   for (const a of anchors) {
     const at = found.find((x) => x.network_id === a.id)?.geometry.coordinates,
-      off_m =
-        at && Math.hypot((at[0] - lon) * m_per_deg_lon - a.e, (at[1] - lat) * m_per_deg - a.n, at[2] - 50 - a.u);
+      off_m = at && Math.hypot((at[0] - lon) * m_per_deg_lon - a.e, (at[1] - lat) * m_per_deg - a.n, at[2] - 50 - a.u);
     if (!(off_m < furthest_m)) {
       wrong++;
       console.error(`${a.id}: ${off_m === undefined ? 'not found' : `${off_m.toFixed(3)} m off`}`);
