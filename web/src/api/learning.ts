@@ -159,16 +159,18 @@ export const roll_back = (task: Task, key: string): Promise<unknown> =>
   call('post', '/models/rollback', { body: { task }, headers: { 'Idempotency-Key': key } });
 export const cancel_job = (job: string): Promise<unknown> => call('delete', '/jobs/{id}', { path: { id: job } });
 
-/// The numbers behind one finished run. What a task does not have (a bias has no ROC) is null or empty.
+/// The numbers behind one run. What it does not have is null or empty: all but the dataset before it succeeded, a ROC where it learns a bias.
 export async function run_numbers(run: Run): Promise<RunNumbers> {
   const of = { path: { id: run.id } },
-    none = (): null => null;
+    none = (): null => null,
+    finished = run.state === 'succeeded',
+    tells = finished && !is_bias(run.task);
   const [dataset, confusion, roc, cdf, grid] = await Promise.all([
     get('/datasets/{id}', { path: { id: run.dataset_id } }).catch(none),
-    is_bias(run.task) ? null : get('/training-runs/{id}/confusion', of).catch(none),
-    is_bias(run.task) ? null : get('/training-runs/{id}/roc', of).catch(none),
-    get('/training-runs/{id}/cdf', of).catch(none),
-    get('/training-runs/{id}/grid', of).catch(none),
+    tells ? get('/training-runs/{id}/confusion', of).catch(none) : null,
+    tells ? get('/training-runs/{id}/roc', of).catch(none) : null,
+    finished ? get('/training-runs/{id}/cdf', of).catch(none) : null,
+    finished ? get('/training-runs/{id}/grid', of).catch(none) : null,
   ]);
   return {
     split: dataset?.report ?? null,
