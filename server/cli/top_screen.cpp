@@ -157,7 +157,7 @@ std::string aircraft(const Json& drone) {
   if (!flag(drone, "connected")) {
     const auto silent = number(drone, "silent_s");
     return "Aircraft: NOT CONNECTED" +
-           (silent ? ", silent for " + seconds(silent) + " s" : std::string(", never heard"));
+           (silent ? ", silent for " + seconds(silent) + " s" : std::string(", nothing received"));
   }
   std::string out = "Aircraft: " + text(drone, "mode");
   out += flag(drone, "armed") ? ", ARMED" : ", DISARMED";

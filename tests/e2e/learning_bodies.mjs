@@ -1,6 +1,6 @@
 // Requests of training runs on the data set 'set' that several tests send.
 
-const values = (n, from, step) => Array.from({ length: n }, (_, i) => Number((from * step ** i).toPrecision(6)));
+export const values = (n, from, step) => Array.from({ length: n }, (_, i) => Number((from * step ** i).toPrecision(6)));
 
 /** A grid that takes minutes: whatever interrupts it does so half-way. */
 export const endless = {

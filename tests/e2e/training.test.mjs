@@ -7,7 +7,7 @@ import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { after, before, test } from 'node:test';
 import { Contract, checked } from './contract.mjs';
-import { endless, quick } from './learning_bodies.mjs';
+import { endless, quick, values } from './learning_bodies.mjs';
 import { binary, eventually, root, startServer } from './server.mjs';
 
 const contract = new Contract();

@@ -512,9 +512,6 @@ TEST(FlightEngine, AnAnchorIsDoneAtItsOwnTargetWhereItHasOne) {
     const auto& task = f.engine.state().anchors[0];
     EXPECT_EQ(task.reached, reached) << own_m.value_or(0) << ": " << task.why;
     EXPECT_EQ(task.done, reached) << task.why;
-    if (!reached) {
-      EXPECT_NE(task.why.find("0.040 m, wanted 0.020 m"), std::string::npos) << task.why;
-    }
   }
 }
 

@@ -159,7 +159,7 @@ TEST(TopScreen, TellsAnAircraftThatWasNeverHeardFromOneThatFellSilent) {
   auto system = Json::parse(documents.system.body);
   system["drone"] = {{"connected", false}, {"silent_s", nullptr}};
   documents.system.body = system.dump();
-  EXPECT_NE(screen(documents).find("Aircraft: NOT CONNECTED, never heard\n"), std::string::npos);
+  EXPECT_NE(screen(documents).find("Aircraft: NOT CONNECTED, nothing received\n"), std::string::npos);
   system["drone"]["silent_s"] = 12.4;
   documents.system.body = system.dump();
   EXPECT_NE(screen(documents).find("Aircraft: NOT CONNECTED, silent for 12 s\n"), std::string::npos);
