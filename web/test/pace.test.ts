@@ -1,5 +1,6 @@
-import { expect, test } from 'vitest';
-import { Pace } from '../src/state/pace';
+import { options } from 'preact';
+import { expect, test, vi } from 'vitest';
+import { Pace, pace_components } from '../src/state/pace';
 
 const rest_after = (took_ms: number): number => {
   const pace = new Pace();
@@ -23,4 +24,41 @@ test('a rest ends by itself, and by a short picture it is not made longer', () =
   pace.ends(920);
   expect(pace.rest_ms(920)).toBe(80);
   expect(pace.rest_ms(1200)).toBe(0);
+});
+test('what a person does is not kept waiting, and is answered with what was said before it', async () => {
+  vi.useFakeTimers({ toFake: ['setTimeout', 'performance'] });
+  const page = new EventTarget(),
+    drawn: string[] = [],
+    turns = async (): Promise<void> => {
+      for (let i = 0; i < 20; i++) await new Promise((done) => setImmediate(done));
+    },
+    draw = (what: string, takes_ms = 0): void =>
+      options.debounceRendering!(() => {
+        vi.advanceTimersByTime(takes_ms);
+        drawn.push(what);
+      });
+  globalThis.requestAnimationFrame = (f) => Number(!setImmediate(() => f(performance.now())));
+  pace_components(page);
+  draw('a long picture', 400);
+  await turns();
+  draw('from the stream');
+  await turns();
+  expect(drawn).toEqual(['a long picture']); // the page rests
+  page.dispatchEvent(Object.assign(new Event('pointermove'), { buttons: 0 }));
+  expect(drawn).toHaveLength(1);
+  page.addEventListener('click', () => {
+    expect(drawn).toEqual(['a long picture', 'from the stream']);
+    draw('the answer');
+  });
+  page.dispatchEvent(new Event('click'));
+  await turns();
+  expect(drawn).toEqual(['a long picture', 'from the stream', 'the answer']);
+  vi.advanceTimersByTime(1);
+  draw('from the stream again');
+  await turns();
+  expect(drawn).toHaveLength(3); // it rests on
+  vi.advanceTimersByTime(1000);
+  await turns();
+  expect(drawn).toHaveLength(4);
+  vi.useRealTimers();
 });

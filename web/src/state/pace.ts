@@ -33,16 +33,47 @@ function after_rest(draw: () => void): void {
   if (wait_ms > 0) setTimeout(() => after_rest(draw), wait_ms);
   else draw();
 }
-/// From now on components are drawn anew only when the page had time to read: many messages change something of some of them.
-export function pace_components(): void {
-  options.debounceRendering = (render) =>
-    queueMicrotask(() =>
-      after_rest(() => {
-        pace.begins(performance.now());
-        requestAnimationFrame(() => ended.port1.postMessage(null));
-        render();
-      }),
-    );
+/// What a person does: a handler works with what was drawn last, so that what was typed is drawn before the next click is heard.
+const DEEDS = [
+  'pointerdown',
+  'pointermove',
+  'pointerup',
+  'click',
+  'keydown',
+  'keyup',
+  'input',
+  'change',
+  'submit',
+  'drop',
+  'hashchange',
+  'popstate',
+];
+const hovers = (e: Event): boolean => e.type === 'pointermove' && (e as PointerEvent).buttons === 0;
+
+/// From now on components are drawn anew only when the page had time to read, since many messages change something of some of them; at once where
+/// a person did something.
+export function pace_components(page: EventTarget = globalThis): void {
+  let waiting: (() => void) | null = null,
+    at_once = false;
+  const draw = (): void => {
+    const render = waiting;
+    if (!render) return;
+    waiting = null;
+    pace.begins(performance.now());
+    requestAnimationFrame(() => ended.port1.postMessage(null));
+    render();
+  };
+  options.debounceRendering = (render) => {
+    waiting = render;
+    queueMicrotask(at_once ? draw : () => after_rest(draw));
+  };
+  const deed = (e: Event): void => {
+    if (hovers(e)) return;
+    draw();
+    at_once = true;
+    setTimeout(() => (at_once = false));
+  };
+  for (const kind of DEEDS) page.addEventListener(kind, deed, { capture: true, passive: true });
 }
 /// As requestAnimationFrame, once the page had time to read.
 export function next_picture(draw: (t_ms: number) => void): void {
