@@ -46,17 +46,20 @@ test('what a person does is not kept waiting, and is answered with what was said
   expect(drawn).toEqual(['a long picture']); // the page rests
   page.dispatchEvent(Object.assign(new Event('pointermove'), { buttons: 0 }));
   expect(drawn).toHaveLength(1);
-  page.addEventListener('click', () => {
+  page.addEventListener('keydown', () => {
     expect(drawn).toEqual(['a long picture', 'from the stream']);
     draw('the answer');
   });
-  page.dispatchEvent(new Event('click'));
+  page.dispatchEvent(new Event('keydown'));
   await turns();
   expect(drawn).toEqual(['a long picture', 'from the stream', 'the answer']);
   vi.advanceTimersByTime(1);
   draw('from the stream again');
   await turns();
   expect(drawn).toHaveLength(3); // it rests on
+  page.addEventListener('input', () => expect(drawn).toHaveLength(3)); // what was typed stands in the page until it is taken
+  page.dispatchEvent(new Event('input'));
+  expect(drawn).toHaveLength(3);
   vi.advanceTimersByTime(1000);
   await turns();
   expect(drawn).toHaveLength(4);

@@ -33,21 +33,10 @@ function after_rest(draw: () => void): void {
   if (wait_ms > 0) setTimeout(() => after_rest(draw), wait_ms);
   else draw();
 }
-/// What a person does: a handler works with what was drawn last, so that what was typed is drawn before the next click is heard.
-const DEEDS = [
-  'pointerdown',
-  'pointermove',
-  'pointerup',
-  'click',
-  'keydown',
-  'keyup',
-  'input',
-  'change',
-  'submit',
-  'drop',
-  'hashchange',
-  'popstate',
-];
+/// A person begins something: what waits is drawn first, so that a handler works with all that was typed before it.
+const BEGINS = ['pointerdown', 'pointermove', 'pointerup', 'keydown', 'beforeinput', 'submit', 'drop'];
+/// Something was done and is drawn at once. Nothing is drawn before its handler: a form that is drawn now would take back what was just put in.
+const DONE = ['click', 'keyup', 'input', 'change', 'hashchange', 'popstate'];
 const hovers = (e: Event): boolean => e.type === 'pointermove' && (e as PointerEvent).buttons === 0;
 
 /// From now on components are drawn anew only when the page had time to read, since many messages change something of some of them; at once where
@@ -67,13 +56,17 @@ export function pace_components(page: EventTarget = globalThis): void {
     waiting = render;
     queueMicrotask(at_once ? draw : () => after_rest(draw));
   };
-  const deed = (e: Event): void => {
-    if (hovers(e)) return;
-    draw();
+  const hurry = (): void => {
     at_once = true;
     setTimeout(() => (at_once = false));
   };
-  for (const kind of DEEDS) page.addEventListener(kind, deed, { capture: true, passive: true });
+  const begins = (e: Event): void => {
+    if (hovers(e)) return;
+    draw();
+    hurry();
+  };
+  for (const kind of BEGINS) page.addEventListener(kind, begins, { capture: true, passive: true });
+  for (const kind of DONE) page.addEventListener(kind, hurry, { capture: true, passive: true });
 }
 /// As requestAnimationFrame, once the page had time to read.
 export function next_picture(draw: (t_ms: number) => void): void {
