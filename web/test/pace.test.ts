@@ -60,8 +60,13 @@ test('what a person does is not kept waiting, and is answered with what was said
   page.addEventListener('input', () => expect(drawn).toHaveLength(3)); // what was typed stands in the page until it is taken
   page.dispatchEvent(new Event('input'));
   expect(drawn).toHaveLength(3);
-  vi.advanceTimersByTime(1000);
+  vi.advanceTimersByTime(1);
+  expect(drawn).toHaveLength(4);
+  draw('and again');
   await turns();
   expect(drawn).toHaveLength(4);
+  vi.advanceTimersByTime(1000);
+  await turns();
+  expect(drawn).toHaveLength(5);
   vi.useRealTimers();
 });

@@ -58,7 +58,10 @@ export function pace_components(page: EventTarget = globalThis): void {
   };
   const hurry = (): void => {
     at_once = true;
-    setTimeout(() => (at_once = false));
+    setTimeout(() => {
+      at_once = false;
+      draw(); // also what joined a picture that was waiting
+    });
   };
   const begins = (e: Event): void => {
     if (hovers(e)) return;
