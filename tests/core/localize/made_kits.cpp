@@ -70,6 +70,8 @@ const char* word(Spoilage spoilage) {
       return "bursts";
     case Spoilage::one_sided:
       return "one side";
+    case Spoilage::late_side:
+      return "late side";
     case Spoilage::one_anchor:
       return "one anchor";
     case Spoilage::far_off:
@@ -112,6 +114,7 @@ KitFlight fly(const MadeKit& kit, const std::string& name, Random& random, Spoil
   const double bias_m = kit.bias_m + normal(random, k_wander_m);
   const double blocked_from_rad = between(random, 0, 2 * std::numbers::pi);
   const double noise_m = between(random, 0.02, 0.06);
+  const double side_delay_m = spoilage == Spoilage::late_side ? between(random, 0.2, 2.0) : 0.0;
   const int n_anchors = static_cast<int>(between(random, 4, 7));
   for (int a = 0; a < n_anchors; ++a) {
     const NetworkId id{static_cast<std::uint32_t>(0x6000 + a)};
@@ -149,7 +152,8 @@ KitFlight fly(const MadeKit& kit, const std::string& name, Random& random, Spoil
             burst_until_s = t_s + 8.0;
           late = t_s < burst_until_s;
           break;
-        case Spoilage::one_sided: {
+        case Spoilage::one_sided:
+        case Spoilage::late_side: {
           const double from =
               std::remainder(std::atan2(ray.y(), ray.x()) - blocked_from_rad, 2 * std::numbers::pi);
           late = std::abs(from) < share * std::numbers::pi;
@@ -161,6 +165,8 @@ KitFlight fly(const MadeKit& kit, const std::string& name, Random& random, Spoil
       }
       if (late && spoilage == Spoilage::far_off)
         range.distance_m += between(random, 0, 20);
+      else if (late && spoilage == Spoilage::late_side)
+        range.distance_m += side_delay_m;
       else if (late)
         range.distance_m += 0.3 + std::exponential_distribution<double>(1 / 0.5)(random);
       flight.ranges.push_back(range);

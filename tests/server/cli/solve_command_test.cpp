@@ -206,6 +206,7 @@ TEST_F(SolveCommand, RefusesWhatWouldDoNothing) {
   refused("--likelihood loss", "--models");
   refused("--truth anchors_truth.csv", "--report");
   refused("--bias 1e9", "200");
+  refused("--lever-arm-sigma 0", "lever-arm-sigma");
   const fs::path kit = folder_ / "kit.json";
   ASSERT_EQ(run("profile fit " + quoted() + " --out '" + kit.string() + "'").exit_code, 0);
   std::stringstream text;
