@@ -83,12 +83,12 @@ TEST(Coverage, HoldsWhereOneSideIsBlocked) {
 }
 
 // All ranges from one side late by the same 0.2 to 2 m: nothing scatters, and bias, lag and place take most
-// of it in. Without doubt of a side 46 to 83 % lay inside.
-TEST(Coverage, NearlyHoldsWhereOneSideIsLateAlike) {
+// of it in. Without doubt of a side 5 to 29 % lay inside, and nearly all were accepted.
+TEST(Coverage, HoldsWhereOneSideIsLateAlike) {
   Coverage all;
   for (const double share : {0.3, 0.5, 0.7}) {
     const Coverage one = covered(Spoilage::late_side, share, 30);
-    EXPECT_GE(one.share(), 0.90) << share;
+    EXPECT_GE(one.share(), 0.93) << share;
     all.accepted += one.accepted;
     all.far_outside += one.far_outside;
   }
@@ -96,7 +96,7 @@ TEST(Coverage, NearlyHoldsWhereOneSideIsLateAlike) {
 }
 
 // 0.3 m beside the declared place, in any direction of the body. Along the course the arm looks like a lag
-// and like a bias; a flight that never turns says nothing of it, and none of its anchors is accepted.
+// and like a bias; a flight that never turns says nothing of it, and anchors are held back for that.
 TEST(Coverage, HoldsWhereTheLeverArmIsDeclaredWrongly) {
   enum class Heading { course, turning, constant };
   for (const Heading heading : {Heading::course, Heading::turning, Heading::constant}) {
@@ -130,7 +130,6 @@ TEST(Coverage, HoldsWhereTheLeverArmIsDeclaredWrongly) {
     std::printf("wrong arm, %s: %d accepted, %d of them inside\n", name, accepted, inside);
     EXPECT_GE(100 * inside, 93 * accepted) << name;
     EXPECT_EQ(far_outside, 0) << name;
-    if (heading == Heading::constant) EXPECT_EQ(accepted, 0);
   }
 }
 

@@ -67,8 +67,8 @@ TEST(UnseenArm, IsInTheRegionsWhereItsSigmaIsDeclared) {
         with.anchors[i].estimate.best->covariance_m2 - without.anchors[i].estimate.best->covariance_m2;
     for (const int axis : {0, 1}) EXPECT_NEAR(more_m2(axis, axis), 0.05 * 0.05, 0.0004) << axis;
     EXPECT_NEAR(more_m2(2, 2), 0, 0.0002);
-    EXPECT_NEAR(with.anchors[i].budget.trace_m2(ErrorSource::lever_arm) -
-                    without.anchors[i].budget.trace_m2(ErrorSource::lever_arm),
+    EXPECT_NEAR(with.anchors[i].budget->trace_m2(ErrorSource::lever_arm) -
+                    without.anchors[i].budget->trace_m2(ErrorSource::lever_arm),
                 2 * 0.05 * 0.05, 0.001);
   }
   // Of an aircraft that turned the same sigma is nearly nothing.
