@@ -11,6 +11,7 @@
 #include "core/localize/joint_model.hpp"
 #include "core/localize/kit_prior.hpp"
 #include "core/localize/scatter_doubt.hpp"
+#include "core/localize/sector_doubt.hpp"
 #include "core/localize/unplaced.hpp"
 
 namespace anchord {
@@ -315,6 +316,12 @@ Result<std::vector<FlightSolution>> solve_flights(std::span<const FlightData* co
           std::to_string(n) + " of " + std::to_string(work.rows.anchors.size()) +
           " anchors are less certain because their ranges scatter more from some directions than from "
           "others: an obstacle there may lengthen them");
+  }
+  for (Work& work : all) {
+    if (const std::size_t n = add_sector_doubt(work.rows, work.options, work.fit))
+      work.rows.notes.push_back(std::to_string(n) + " of " + std::to_string(work.rows.anchors.size()) +
+                                " anchors are less certain because their ranges fit better if those from one "
+                                "side are late: an obstacle there may lengthen them");
   }
   for (std::size_t i = 0; i < all.size(); ++i) {
     Work& work = all[i];
