@@ -97,6 +97,12 @@ void delay_one_side(FlightData& flight) {
     if (east(range)) range.distance_m += 0.5;
 }
 
+/// The tag is 0.3 m from where it is declared. Where the track is the tag's own there is no arm.
+void declare_arm_wrongly(FlightData& flight) {
+  if (flight.mission.point == TrackPoint::tag_antenna) return;
+  for (auto& tag : flight.mission.tags) tag.lever_arm_body_m += Eigen::Vector3d(0.18, -0.24, 0);
+}
+
 void exchange_two_anchors_half_way(FlightData& flight) {
   const NetworkId a = flight.anchor_names.begin()->first, b = std::next(flight.anchor_names.begin())->first;
   const double half_s = 0.5 * since_start_s(flight, flight.ranges.back());
@@ -133,6 +139,7 @@ TEST(SpoiltRealFlights, AreNeverAcceptedBesideTheTruth) {
       {"first third", [](FlightData& f) { keep_part(f, 0, 1.0 / 3); }},
       {"one side", keep_one_side},
       {"one side 0.5 m late", delay_one_side},
+      {"lever arm 0.3 m off", declare_arm_wrongly},
       {"anchors exchanged", exchange_two_anchors_half_way},
   };
   int anchors = 0, accepted = 0, outside = 0;
