@@ -29,18 +29,21 @@ struct Sums {
   Matrix5 normal{Matrix5::Zero()};
   Vector5 pull{Vector5::Zero()};
   double square_m2{};
+  double kept{};  ///< weight that the fit itself gives to these ranges
   int n{};
   Sums& operator+=(const Sums& o) {
     normal += o.normal;
     pull += o.pull;
     square_m2 += o.square_m2;
+    kept += o.kept;
     n += o.n;
     return *this;
   }
 };
 using Bins = std::array<Sums, k_bins>;
 
-Bins by_bearing(const FlightRows& flight, const JointFit& fit, std::size_t index) {
+Bins by_bearing(const FlightRows& flight, const FlightOptions& options, const JointFit& fit,
+                std::size_t index) {
   const JointState::Anchor& anchor = fit.state.anchors[index];
   const double wide_m = k_wide_scales * fit.normal.anchors[index].scale_m;
   Bins bins{};
@@ -58,6 +61,7 @@ Bins by_bearing(const FlightRows& flight, const JointFit& fit, std::size_t index
     bin.normal.noalias() += weight * by * by.transpose();
     bin.pull += weight * at.residual_m * by;
     bin.square_m2 += weight * at.residual_m * at.residual_m;
+    bin.kept += robust_weight(at.residual_m / fit.normal.anchors[index].scale_m, options);
     ++bin.n;
   }
   return bins;
@@ -66,6 +70,7 @@ Bins by_bearing(const FlightRows& flight, const JointFit& fit, std::size_t index
 /// The sector whose ranges are most likely late.
 struct LateSide {
   double delay_m{}, gain{};
+  double kept{};  ///< part of the delay that the fit has in it: 0 where its loss rejects these ranges
   Eigen::Vector4d moved{Eigen::Vector4d::Zero()};  ///< to where place and unit delay would be without
 };
 
@@ -95,6 +100,8 @@ LateSide late_side(const Bins& bins, const AnchorBlock& block) {
       if (!(told > 1e-6 * weight) || !(delay_m > 0) || !(left_m2 < least_m2)) continue;
       least_m2 = left_m2;
       best.delay_m = delay_m;
+      best.kept = std::min(1.0, sector.kept * (all.normal(4, 4) - weight) /
+                                    std::max(weight * (all.kept - sector.kept), 1e-9 * weight));
       best.moved = inverse * (pull - with * delay_m);
     }
   }
@@ -110,15 +117,16 @@ std::size_t add_sector_doubt(const FlightRows& flight, const FlightOptions& opti
   std::size_t n_wider = 0;
   for (std::size_t i = 0; i < flight.anchors.size(); ++i) {
     if (!fit.state.anchors[i].active) continue;
-    const LateSide side = late_side(by_bearing(flight, fit, i), fit.normal.anchors[i]);
+    const LateSide side = late_side(by_bearing(flight, options, fit, i), fit.normal.anchors[i]);
     const double share =
         std::clamp((side.gain - k_doubted_gain) / (k_believed_gain - k_doubted_gain), 0.0, 1.0);
     if (!(share > 0) || !side.moved.allFinite()) continue;
     Eigen::Matrix4d& covariance_m2 = fit.anchor_covariance[i];
     const Eigen::Matrix4d before_m2 = covariance_m2;
     reach(share * side.moved, options.dims, covariance_m2);
-    widen_in_plane(share * std::max(side.moved.head<2>().norm(), 2 / std::numbers::pi * side.delay_m),
-                   covariance_m2);
+    widen_in_plane(
+        share * std::max(side.moved.head<2>().norm(), 2 / std::numbers::pi * side.kept * side.delay_m),
+        covariance_m2);
     n_wider += much_wider(covariance_m2, before_m2, options.dims) ? 1 : 0;
   }
   return n_wider;

@@ -84,19 +84,25 @@ Reach worst_of(const std::vector<Eigen::Vector3d>& moves, const Eigen::Matrix3d&
   return worst;
 }
 
-std::string why(double moved_m, double unapplied) {
-  char text[300];
+std::string why(const Reach& worst, double unapplied) {
+  char text[320];
   if (unapplied > 0)
     std::snprintf(text, sizeof text,
                   "the track has no heading, so %.2f m of the lever arm across are not applied: record the "
                   "attitude, or mount the tag below the antenna",
                   unapplied);
-  else
+  else if (worst.regions <= 1.0)
     std::snprintf(
         text, sizeof text,
-        "a lever arm that is wrong by up to %.1f m may move it by %.2f m and show in no range: turn "
-        "the aircraft once over a point, or give the arm's sigma",
-        k_arm_asked_m, moved_m);
+        "a lever arm that is wrong by up to %.1f m shows, or moves it by %.2f m at most, within its "
+        "region",
+        k_arm_asked_m, worst.moved_m);
+  else
+    std::snprintf(text, sizeof text,
+                  "a lever arm that is wrong by up to %.1f m may move it by %.2f m, out of its region, and "
+                  "show in no range: fly 20 s or more with the heading a quarter turn away, or declare how "
+                  "well the arm was measured (lever_arm_sigma_m)",
+                  k_arm_asked_m, worst.moved_m);
   return text;
 }
 
@@ -127,7 +133,7 @@ std::vector<Gate> unseen_arm_gates(const FlightRows& flight, const JointFit& fit
     covariance_m2.diagonal().array() += options.floor_sigma_m * options.floor_sigma_m;
     const Reach worst = worst_of(moves_of(arm.anchors[i], arm, unapplied), covariance_m2, options.dims);
     gates.push_back({"unseen_arm", worst.moved_m, worst.regions > 0 ? worst.moved_m / worst.regions : 0.0,
-                     worst.regions <= 1.0, why(worst.moved_m, unapplied)});
+                     worst.regions <= 1.0, why(worst, unapplied)});
   }
   return gates;
 }

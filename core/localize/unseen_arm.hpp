@@ -20,9 +20,15 @@ void add_arm_doubt(const SharedPrior& prior, const FlightOptions& options, Joint
 /// against the anchor's own 95 % region. An aircraft that keeps one heading shows none of it, and moves
 /// all anchors alike. A track without attitude has no arm but the upward part: what is declared across is
 /// then the error.
-/// returns  gate unseen_arm of each anchor of the flight, in metres; nothing where the arm is estimated,
-/// where
-///          its uncertainty is declared, or where the track is the tag's own
+///
+/// Of 298 made anchors with an arm wrong by 0.3 m and one heading 289 are held back, and none is accepted
+/// beyond 1.5 regions; without the gate nearly all are accepted, 3 % of them inside. As many are held back
+/// where the arm is right, for nothing tells the two apart. A quarter turn of the heading for half of the
+/// flight lets 297 of the 298 right ones pass, for 20 s 291, a full turn within 12 s only 161; along the
+/// course 294.
+///
+/// returns  gate unseen_arm of each anchor, in metres; nothing where the arm is estimated, where its
+///          uncertainty is declared, or where the track is the tag's own
 std::vector<Gate> unseen_arm_gates(const FlightRows& flight, const JointFit& fit, const SharedPrior& prior,
                                    const FlightOptions& options);
 

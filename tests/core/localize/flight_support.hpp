@@ -17,7 +17,7 @@ struct MadeFlight {
   double nlos_share{0};                  ///< ranges with 0.3 to 2 m excess
   Eigen::Vector3d arm_error_m{0, 0, 0};  ///< the antenna against where it is declared, body frame
   std::vector<double> delays_m;          ///< of each anchor; missing: none
-  double turn_rate_radps{0.1};           ///< of the heading; 0: it stays east
+  double turn_rate_radps{0};             ///< of the heading, which otherwise stays east
   bool pairs{false};                     ///< ranges between the anchors too, all 0.1 m long
   TrackFrame frame{TrackFrame::local};
   Wgs84 origin{50.8789, 4.7005, 80.0};

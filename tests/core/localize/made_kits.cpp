@@ -70,12 +70,12 @@ const char* word(Spoilage spoilage) {
       return "bursts";
     case Spoilage::one_sided:
       return "one side";
-    case Spoilage::late_side:
-      return "late side";
     case Spoilage::one_anchor:
       return "one anchor";
     case Spoilage::far_off:
       return "0 to 20 m";
+    case Spoilage::late_side:
+      return "late side";
   }
   return "";
 }
@@ -114,7 +114,6 @@ KitFlight fly(const MadeKit& kit, const std::string& name, Random& random, Spoil
   const double bias_m = kit.bias_m + normal(random, k_wander_m);
   const double blocked_from_rad = between(random, 0, 2 * std::numbers::pi);
   const double noise_m = between(random, 0.02, 0.06);
-  const double side_delay_m = spoilage == Spoilage::late_side ? between(random, 0.2, 2.0) : 0.0;
   const int n_anchors = static_cast<int>(between(random, 4, 7));
   for (int a = 0; a < n_anchors; ++a) {
     const NetworkId id{static_cast<std::uint32_t>(0x6000 + a)};
@@ -166,7 +165,7 @@ KitFlight fly(const MadeKit& kit, const std::string& name, Random& random, Spoil
       if (late && spoilage == Spoilage::far_off)
         range.distance_m += between(random, 0, 20);
       else if (late && spoilage == Spoilage::late_side)
-        range.distance_m += side_delay_m;
+        range.distance_m += 0.5;
       else if (late)
         range.distance_m += 0.3 + std::exponential_distribution<double>(1 / 0.5)(random);
       flight.ranges.push_back(range);
