@@ -106,6 +106,7 @@ constexpr std::array k_gate_words{
     GateWords{"moved", "It is where it was", "χ²"},
     GateWords{"bias", "Range bias of the kit, σ", "m"},
     GateWords{"lever_arm", "The lever arm fits the flight", "σ"},
+    GateWords{"unseen_arm", "Error that a wrong lever arm would cause unseen", "m"},
     GateWords{"settled", "Rounds until the joint solution settled", ""},
     GateWords{"goal_h95_m", "95 % horizontal", "m"},
     GateWords{"goal_v95_m", "95 % vertical", "m"},

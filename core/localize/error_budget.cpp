@@ -190,6 +190,10 @@ std::vector<ErrorBudget> error_budgets(const FlightRows& flight, const JointFit&
       doubt.col(2).setZero();
     }
     budget.part(ErrorSource::bias) += doubt - given[0][i];
+    if (i < fit.arm_covariance_m2.size()) {
+      budget.part(ErrorSource::bias) -= fit.arm_covariance_m2[i];
+      budget.part(ErrorSource::lever_arm) += fit.arm_covariance_m2[i];
+    }
     const Eigen::Matrix3d& left = given[k_all][i];
     const double even = even_share(left, plane);
     const AnchorBlock& block = fit.normal.anchors[i];

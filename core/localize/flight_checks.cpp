@@ -11,8 +11,6 @@
 namespace anchord {
 namespace {
 
-constexpr double k_arm_asked_m = 0.3;  // as wide as a wrong entry in a form
-constexpr double k_arm_z = 4.0;
 constexpr double k_arm_odd_z = 1.5;  // worth another solve
 constexpr double k_arm_least_m = 0.1;
 constexpr double k_profile_z = 2.5;  // 95 % of the largest of four

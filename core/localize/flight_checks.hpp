@@ -9,6 +9,9 @@
 
 namespace anchord {
 
+inline constexpr double k_arm_asked_m = 0.3;  ///< as wide as a wrong entry in a form
+inline constexpr double k_arm_z = 4.0;        ///< sigmas of the flight: beyond, the arm is contradicted
+
 /// What the ranges say about the forward and left part of the lever arm if it is not held: an arm declared
 /// wrongly moves every anchor, and no residual looks large. One Gauss-Newton step from the solution where
 /// that is clear; where it only looks odd, the flight is solved again with the arm free, since the misfit of

@@ -55,8 +55,11 @@ struct FlightOptions {
   double lever_prior_m{0.1};          ///< body z only: x, y are confounded with the lag
   double lever_across_prior_m{0};     ///< body x and y; 0: held at the declared arm. Only where heading and
                                       ///< course differ can it be told from the lag
-  double pair_sigma_m{0.1};           ///< of a range between two anchors, whatever its repeats say
-  double pair_bias_prior_m{0.3};      ///< common to all ranges between anchors
+  /// One sigma of the declared arm's forward and left part, as it was measured; the regions then hold it.
+  /// Absent: unknown, and anchors that a wrong arm would move unseen are held back (unseen_arm.hpp).
+  std::optional<double> lever_arm_sigma_m{};
+  double pair_sigma_m{0.1};              ///< of a range between two anchors, whatever its repeats say
+  double pair_bias_prior_m{0.3};         ///< common to all ranges between anchors
   std::optional<double> fixed_bias_m{};  ///< no estimate: this bias is given
 
   double mad_factor{0.6};  ///< Tukey cut-off = 4.685 x this x scale; below 1 is what late clusters need

@@ -174,6 +174,7 @@ Result<FlightRows> flight_rows(const FlightData& flight, const FlightOptions& op
                   0,
                   std::move(checked.refused),
                   {},
+                  flight.mission.point,
                   checked.step_share};
   rows.track_span_s = rows.track.poses().back().t_s - rows.track.poses().front().t_s;
   note_track(flight, checked.notes, rows);

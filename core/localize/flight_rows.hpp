@@ -57,6 +57,7 @@ struct FlightRows {
   double track_span_s{};
   std::map<std::string, std::size_t> fixes_refused{};  ///< reason -> count
   std::vector<FlightAntenna> antennas{};               ///< those heard, by tag and antenna
+  TrackPoint point{TrackPoint::body};                  ///< what the track is of
   double step_share{};  ///< of the good positions: in parts that are off as a whole (CheckedTrack)
 };
 

@@ -11,7 +11,9 @@
 #include "core/localize/joint_model.hpp"
 #include "core/localize/kit_prior.hpp"
 #include "core/localize/scatter_doubt.hpp"
+#include "core/localize/sector_doubt.hpp"
 #include "core/localize/unplaced.hpp"
+#include "core/localize/unseen_arm.hpp"
 
 namespace anchord {
 namespace {
@@ -29,8 +31,9 @@ struct Work {
   ProfileFactor alone{};  ///< what the flight said before it was told anything
   std::string kit{}, name{}, digest{};
   BiasGate gate{};
-  std::vector<Gate> checks{};  ///< of the whole flight: every anchor must pass them
-  bool antennas_apart{true};   ///< their vertical arms differ by what this flight can show
+  std::vector<Gate> checks{};      ///< of the whole flight: every anchor must pass them
+  std::vector<Gate> unseen_arm{};  ///< one for each anchor, where it is asked
+  bool antennas_apart{true};       ///< their vertical arms differ by what this flight can show
 
   Eigen::Index antennas() const {
     return static_cast<Eigen::Index>(std::min<std::size_t>(rows.antennas.size(), k_most_antennas));
@@ -216,6 +219,7 @@ FlightSolution describe(const Work& work, const FlightData& flight) {
     if (anchor.estimate.best) {
       auto& gates = anchor.estimate.gates;
       gates.insert(gates.end(), work.checks.begin(), work.checks.end());
+      if (!work.unseen_arm.empty()) gates.push_back(work.unseen_arm[i]);
       anchor.budget = std::move(budgets[i]);
     }
     anchor.search = work.searches[i];
@@ -242,7 +246,8 @@ Result<void> FlightOptions::check() const {
       positive(bias_prior_m) && positive(calibrated_bias_prior_m) && positive(delay_prior_m) &&
       positive(curve_prior_m) && positive(lag_prior_s) && positive(lever_prior_m) && positive(mad_factor) &&
       positive(min_scale_m) && correlation_s >= 0 && floor_sigma_m >= 0 && min_range_m >= 0 &&
-      max_range_m > min_range_m && (!max_gap_s || positive(*max_gap_s)) && positive(track.max_speed_mps) &&
+      max_range_m > min_range_m && (!lever_arm_sigma_m || positive(*lever_arm_sigma_m)) &&
+      (!max_gap_s || positive(*max_gap_s)) && positive(track.max_speed_mps) &&
       positive(track.max_acceleration_mps2) && positive(track.max_correction_age_s) &&
       (!anchor_height_m || std::isfinite(*anchor_height_m)) &&
       (!height_prior || (std::isfinite(height_prior->height_m) && positive(height_prior->sigma_m)));
@@ -316,10 +321,18 @@ Result<std::vector<FlightSolution>> solve_flights(std::span<const FlightData* co
           " anchors are less certain because their ranges scatter more from some directions than from "
           "others: an obstacle there may lengthen them");
   }
+  for (Work& work : all) {
+    if (const std::size_t n = add_sector_doubt(work.rows, work.options, work.fit))
+      work.rows.notes.push_back(std::to_string(n) + " of " + std::to_string(work.rows.anchors.size()) +
+                                " anchors are less certain because their ranges fit better if those from one "
+                                "side are late: an obstacle there may lengthen them");
+  }
   for (std::size_t i = 0; i < all.size(); ++i) {
     Work& work = all[i];
     BOOST_OUTCOME_TRY(const auto arm, check_lever_arm(work.rows, work.fit, work.prior, work.options));
     if (arm) work.checks.push_back(*arm);
+    add_arm_doubt(work.prior, work.options, work.fit);
+    work.unseen_arm = unseen_arm_gates(work.rows, work.fit, work.prior, work.options);
     if (work.rows.step_share > 0) work.checks.push_back(check_steps(work.rows.step_share, options));
     const auto others = others_of(all, i, options);
     if (!others.empty() && !options.fixed_bias_m)

@@ -98,7 +98,8 @@ struct JointFit {
   JointState state;
   JointNormal normal;  ///< at the state
   SharedMatrix shared_covariance{SharedMatrix::Zero()};
-  std::vector<Eigen::Matrix4d> anchor_covariance;  ///< (x, d) of each anchor, everything else marginalised
+  std::vector<Eigen::Matrix4d> anchor_covariance;    ///< (x, d) of each anchor, everything else marginalised
+  std::vector<Eigen::Matrix3d> arm_covariance_m2{};  ///< of that, by the declared sigma of the lever arm
   int rounds{};
   bool converged{false};
 };

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/base/median.hpp"
+#include "core/localize/widen.hpp"
 
 namespace anchord {
 namespace {
@@ -70,17 +71,6 @@ void find_hidden(std::span<Line> lines, double scale_m) {
   }
 }
 
-/// Lets one sigma of the covariance, in the direction of the move, be at least the move. What is claimed
-/// already for other reasons is not claimed twice. True where the position became less certain by a tenth.
-bool reach(const Eigen::Vector4d& moved, Dims dims, Eigen::Matrix4d& covariance) {
-  const int n = dims == Dims::two ? 2 : 3;
-  const Eigen::MatrixXd position = covariance.topLeftCorner(n, n);
-  const double sigmas2 = moved.head(n).dot(position.ldlt().solve(moved.head(n)));
-  if (!(sigmas2 > 1.0) || !moved.allFinite()) return false;
-  covariance += (1.0 - 1.0 / sigmas2) * moved * moved.transpose();
-  return covariance.topLeftCorner(n, n).trace() > 1.21 * position.trace();
-}
-
 }  // namespace
 
 std::size_t add_scatter_doubt(const FlightRows& flight, const SharedPrior& prior,
@@ -106,7 +96,9 @@ std::size_t add_scatter_doubt(const FlightRows& flight, const SharedPrior& prior
     if (!fit.state.anchors[i].active) continue;
     const AnchorBlock& block = fit.normal.anchors[i];
     const Eigen::Vector4d moved = block.own_inverse * (own[i] - block.shared * shared);
-    n_wider += reach(moved, options.dims, fit.anchor_covariance[i]) ? 1 : 0;
+    const Eigen::Matrix4d before_m2 = fit.anchor_covariance[i];
+    reach(moved, options.dims, fit.anchor_covariance[i]);
+    n_wider += much_wider(fit.anchor_covariance[i], before_m2, options.dims) ? 1 : 0;
   }
   return n_wider;
 }

@@ -32,7 +32,7 @@ struct Arguments {
   Loss loss{Loss::tukey};
   FixClass min_fix{FixClass::rtk_fixed};
   int dims{3};
-  std::optional<double> bias_m, height_m, max_gap_s;
+  std::optional<double> bias_m, height_m, max_gap_s, lever_arm_sigma_m;
   std::vector<double> height_prior;
   double max_correction_age_s{TrackLimits{}.max_correction_age_s};
   std::string profile, out, priors;
@@ -83,6 +83,7 @@ Result<FlightOptions> options_of(const Arguments& a) {
   options.track.max_correction_age_s = a.max_correction_age_s;
   options.anchor_height_m = a.height_m;
   options.max_gap_s = a.max_gap_s;
+  options.lever_arm_sigma_m = a.lever_arm_sigma_m;
   if (a.height_prior.size() == 2) options.height_prior = {a.height_prior[0], a.height_prior[1]};
   if (!a.profile.empty()) {
     BOOST_OUTCOME_TRY(options.profile, read_profile(a.profile));
@@ -308,6 +309,11 @@ void add_options(CLI::App& command, Arguments& a) {
       ->capture_default_str();
   command.add_option("--bias", a.bias_m,
                      "Range bias of the kit in metres, taken as known instead of estimated");
+  command
+      .add_option("--lever-arm-sigma", a.lever_arm_sigma_m,
+                  "How well the lever arm was measured, forward and left, one sigma in metres: the regions "
+                  "hold it, and a flight that kept one heading is not held back for it")
+      ->check(CLI::Range(0.001, 10.0));
   command.add_option("--profile", a.profile, "Kit profile of earlier flights (anchord profile fit)");
 }
 

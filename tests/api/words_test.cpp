@@ -72,6 +72,18 @@ TEST(CalibrationRequestWords, NameTheLeastFix) {
   EXPECT_EQ(asked("min_fix", "fixed").min_fix, FixClass::rtk_fixed);
 }
 
+TEST(CalibrationRequestWords, DeclareHowWellTheLeverArmWasMeasured) {
+  EXPECT_EQ(asked("lever_arm_sigma_m", 0.02).lever_arm_sigma_m, 0.02);
+  EXPECT_FALSE(asked("dims", 3).lever_arm_sigma_m.has_value());
+  for (const Json& refused : {Json(0), Json(-0.1), Json(11), Json("0.02")}) {
+    std::vector<FieldError> errors;
+    read_calibration_request(
+        Json{{"missions", {"0197a3b0-5d10-7b1e-9c55-0a1b2c3d4e5f"}}, {"lever_arm_sigma_m", refused}}, errors);
+    ASSERT_EQ(errors.size(), 1u) << refused;
+    EXPECT_EQ(errors.front().pointer, "/lever_arm_sigma_m");
+  }
+}
+
 TEST(CalibrationRequestWords, RefuseAnotherWordWithThoseThereAre) {
   std::vector<FieldError> errors;
   read_calibration_request(Json{{"missions", {"0197a3b0-5d10-7b1e-9c55-0a1b2c3d4e5f"}}, {"solver", "newton"}},

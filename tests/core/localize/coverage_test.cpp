@@ -82,25 +82,69 @@ TEST(Coverage, HoldsWhereOneSideIsBlocked) {
   EXPECT_EQ(half.far_outside, 0);
 }
 
+// Late alike from one side nothing scatters, and the places move by up to half a metre: of the anchors
+// accepted at 30 and 50 % more than four in ten once lay beyond 1.5 regions.
+TEST(Coverage, HoldsWhereOneSideIsLateAlike) {
+  int accepted = 0, far_outside = 0;
+  for (const double share : {0.15, 0.3, 0.5, 0.7}) {
+    const Coverage one = covered(Spoilage::late_side, share, 40);
+    EXPECT_GE(one.share(), 0.9) << share;
+    accepted += one.accepted;
+    far_outside += one.far_outside;
+  }
+  EXPECT_LE(100 * far_outside, accepted);
+}
+
+// The doubts of good flights: how many anchors they cost, and how much wider regions are. 471 of these 488
+// were accepted with a median claim of 0.172 m before late sides and wrong lever arms were asked for.
+TEST(Coverage, LosesFewAnchorsOfGoodFlights) {
+  Coverage clean = covered(Spoilage::none, 0, 100);
+  EXPECT_GE(clean.accepted, 0.96 * 471);
+  EXPECT_LE(clean.median_claim_m(), 1.05 * 0.172);
+}
+
+enum class Heading : std::uint8_t { along_the_course, turning, swinging, kept };
+const char* word(Heading heading) {
+  switch (heading) {
+    case Heading::along_the_course:
+      return "along the course";
+    case Heading::turning:
+      return "turning";
+    case Heading::swinging:
+      return "swinging by 20 degrees";
+    case Heading::kept:
+      return "kept";
+  }
+  return "";
+}
+
+void set_heading(FlightData& flight, Heading heading) {
+  if (heading == Heading::along_the_course) return;
+  for (Fix& fix : flight.fixes) {
+    const double t_s = seconds_between(UtcTime{}, fix.time);
+    const double heading_rad = heading == Heading::turning    ? 0.2 * t_s
+                               : heading == Heading::swinging ? 0.35 * std::sin(0.3 * t_s)
+                                                              : 0.0;
+    fix.enu_from_body = Eigen::Quaterniond(Eigen::AngleAxisd(heading_rad, Eigen::Vector3d::UnitZ()));
+  }
+}
+
 // 0.3 m beside the declared place, in any direction of the body. Along the course the arm looks like a lag
-// and like a bias; only a flight that never turns says nothing of it, and is not asked here.
+// and like a bias; a flight that keeps its heading says nothing of it, and all of its anchors were accepted.
 TEST(Coverage, HoldsWhereTheLeverArmIsDeclaredWrongly) {
-  for (const bool turning : {false, true}) {
-    int accepted = 0, inside = 0, far_outside = 0;
-    for (std::uint64_t k = 0; k < 12; ++k) {
+  for (const auto heading : {Heading::along_the_course, Heading::turning, Heading::swinging, Heading::kept}) {
+    int anchors = 0, accepted = 0, inside = 0, far_outside = 0;
+    for (std::uint64_t k = 0; k < 24; ++k) {
       Random random(500 + k);
       KitFlight made = testing::fly(testing::draw_kit(0.0, random), "made", random);
       const double way = std::uniform_real_distribution<double>(0, 6.28)(random);
       made.flight.mission.tags[0].lever_arm_body_m = {0.3 * std::cos(way), 0.3 * std::sin(way), 0};
-      for (Fix& fix : made.flight.fixes) {
-        const double heading_rad = 0.2 * seconds_between(UtcTime{}, fix.time);
-        if (turning)
-          fix.enu_from_body = Eigen::Quaterniond(Eigen::AngleAxisd(heading_rad, Eigen::Vector3d::UnitZ()));
-      }
+      set_heading(made.flight, heading);
       const auto solved = solve_flight(made.flight, made.options());
       ASSERT_TRUE(solved.has_value());
       for (const AnchorSolution& anchor : solved.value().anchors) {
         const Estimate& estimate = anchor.estimate;
+        ++anchors;
         if (!estimate.acceptable()) continue;
         const Eigen::Vector3d off = estimate.best->position.m - made.truth_m.at(estimate.anchor);
         const double far = off.dot(estimate.best->covariance_m2.inverse() * off) / 7.815;
@@ -109,10 +153,11 @@ TEST(Coverage, HoldsWhereTheLeverArmIsDeclaredWrongly) {
         far_outside += far > 1.5 * 1.5 ? 1 : 0;
       }
     }
-    std::printf("wrong arm, %s: %d accepted, %d of them inside\n", turning ? "turning" : "along the course",
-                accepted, inside);
-    EXPECT_GE(100 * inside, 93 * accepted) << turning;
-    EXPECT_EQ(far_outside, 0) << turning;
+    std::printf("wrong arm, heading %s: %d of %d accepted, %d of them inside\n", word(heading), accepted,
+                anchors, inside);
+    // Few are accepted where the heading stays, those of wide regions: the misses count against all anchors.
+    EXPECT_LE(20 * (accepted - inside), anchors) << word(heading);
+    EXPECT_EQ(far_outside, 0) << word(heading);
   }
 }
 

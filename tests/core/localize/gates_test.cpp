@@ -21,19 +21,22 @@ const Gate& gate(const Estimate& estimate, std::string_view name) {
 }
 
 TEST(Gates, LetAnOrdinaryFlightPass) {
-  const auto s = solve_flight(make_flight(MadeFlight{}));
+  MadeFlight made;
+  made.turn_rate_radps = 0.2;
+  const auto s = solve_flight(make_flight(made));
   ASSERT_TRUE(s);
   for (const auto& anchor : s.value().anchors) {
     for (const Gate& g : anchor.estimate.gates) EXPECT_TRUE(g.passed) << g.name << ": " << g.why;
     EXPECT_TRUE(anchor.estimate.acceptable());
     for (const char* name : {"redundancy", "rejected", "geometry", "precision", "side", "residual_scale",
-                             "chi_square", "halves", "bias"})
+                             "chi_square", "halves", "bias", "unseen_arm"})
       EXPECT_TRUE(gate(anchor.estimate, name).value) << name;
   }
 }
 
 TEST(Gates, HoldBackAnAnchorThatMovedInTheMiddleOfTheFlight) {
   MadeFlight before;
+  before.turn_rate_radps = 0.2;
   MadeFlight after = before;
   after.anchors[0] += Eigen::Vector3d(0.6, -0.5, 0);
   FlightData flight = make_flight(before);
@@ -142,7 +145,9 @@ TEST(Gates, AreNeverPassedByAnEstimateWithoutAny) {
 }
 
 TEST(Gates, TellAMovedAnchorFromOneThatStayed) {
-  MadeFlight first, second;
+  MadeFlight first;
+  first.turn_rate_radps = 0.2;
+  MadeFlight second = first;
   second.seed = 2;
   second.anchors[1] += Eigen::Vector3d(0.5, 0.5, 0);
   const auto a = solve_flight(make_flight(first));

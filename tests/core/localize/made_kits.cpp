@@ -74,6 +74,8 @@ const char* word(Spoilage spoilage) {
       return "one anchor";
     case Spoilage::far_off:
       return "0 to 20 m";
+    case Spoilage::late_side:
+      return "late side";
   }
   return "";
 }
@@ -149,7 +151,8 @@ KitFlight fly(const MadeKit& kit, const std::string& name, Random& random, Spoil
             burst_until_s = t_s + 8.0;
           late = t_s < burst_until_s;
           break;
-        case Spoilage::one_sided: {
+        case Spoilage::one_sided:
+        case Spoilage::late_side: {
           const double from =
               std::remainder(std::atan2(ray.y(), ray.x()) - blocked_from_rad, 2 * std::numbers::pi);
           late = std::abs(from) < share * std::numbers::pi;
@@ -161,6 +164,8 @@ KitFlight fly(const MadeKit& kit, const std::string& name, Random& random, Spoil
       }
       if (late && spoilage == Spoilage::far_off)
         range.distance_m += between(random, 0, 20);
+      else if (late && spoilage == Spoilage::late_side)
+        range.distance_m += 0.5;
       else if (late)
         range.distance_m += 0.3 + std::exponential_distribution<double>(1 / 0.5)(random);
       flight.ranges.push_back(range);

@@ -25,8 +25,9 @@ struct MadeKit {
 };
 MadeKit draw_kit(double bias_m, Random& random);
 
-/// How ranges are spoilt beyond what every flight has.
-enum class Spoilage : std::uint8_t { none, scattered, bursts, one_sided, one_anchor, far_off };
+/// How ranges are spoilt beyond what every flight has. One side: by a delay that scatters; late side: by 0.5
+/// m, alike on all of them.
+enum class Spoilage : std::uint8_t { none, scattered, bursts, one_sided, one_anchor, far_off, late_side };
 const char* word(Spoilage spoilage);
 
 /// One flight of a kit round a building of its own, 60 to 120 s; walls, heights, radii and anchors are drawn.

@@ -42,23 +42,6 @@ void add_bias(FlightData& flight, double by_m) {
   for (auto& range : flight.ranges) range.distance_m += by_m;
 }
 
-/// Ranges of the half of the places that lies west (or at small x).
-void keep_one_side(FlightData& flight) {
-  std::vector<std::pair<std::int64_t, double>> track;
-  for (const auto& fix : flight.fixes)
-    track.emplace_back(fix.time.ns, fix.frame == TrackFrame::local ? fix.local_m.x() : fix.position.lon_deg);
-  std::ranges::sort(track);
-  std::vector<double> sorted;
-  for (const auto& [time, x] : track) sorted.push_back(x);
-  std::ranges::sort(sorted);
-  const double middle = sorted[sorted.size() / 2];
-  std::erase_if(flight.ranges, [&](const Range& r) {
-    auto at = std::ranges::lower_bound(track, std::pair{r.time.ns, -1e9});
-    if (at == track.end()) --at;
-    return at->second > middle;
-  });
-}
-
 void block_some(FlightData& flight) {
   std::mt19937_64 random(3);
   std::uniform_real_distribution<double> uniform(0, 1);
@@ -83,6 +66,41 @@ void block_every_second_anchor(FlightData& flight) {
   for (const auto& [id, name] : flight.anchor_names) blocked[id] = blocked.size() % 2 == 0;
   for (auto& range : flight.ranges)
     if (blocked[range.anchor]) range.distance_m += 0.5 + late_m(random);
+}
+
+/// Which half of the places, east or west (or by x), a range was taken in.
+std::function<bool(const Range&)> in_the_east(const FlightData& flight) {
+  std::vector<std::pair<std::int64_t, double>> track;
+  std::vector<double> sorted;
+  for (const auto& fix : flight.fixes) {
+    const double x = fix.frame == TrackFrame::local ? fix.local_m.x() : fix.position.lon_deg;
+    track.emplace_back(fix.time.ns, x);
+    sorted.push_back(x);
+  }
+  std::ranges::sort(track);
+  std::ranges::sort(sorted);
+  const double middle = sorted[sorted.size() / 2];
+  return [track = std::move(track), middle](const Range& r) {
+    auto at = std::ranges::lower_bound(track, std::pair{r.time.ns, -1e9});
+    if (at == track.end()) --at;
+    return at->second > middle;
+  };
+}
+
+/// Ranges of the half of the places that lies west (or at small x).
+void keep_one_side(FlightData& flight) { std::erase_if(flight.ranges, in_the_east(flight)); }
+
+/// An obstacle in the east: 0.5 m, alike on all ranges from there.
+void delay_one_side(FlightData& flight) {
+  const auto east = in_the_east(flight);
+  for (auto& range : flight.ranges)
+    if (east(range)) range.distance_m += 0.5;
+}
+
+/// The tag is 0.3 m from where it is declared. Where the track is the tag's own there is no arm.
+void declare_arm_wrongly(FlightData& flight) {
+  if (flight.mission.point == TrackPoint::tag_antenna) return;
+  for (auto& tag : flight.mission.tags) tag.lever_arm_body_m += Eigen::Vector3d(0.18, -0.24, 0);
 }
 
 void exchange_two_anchors_half_way(FlightData& flight) {
@@ -120,6 +138,8 @@ TEST(SpoiltRealFlights, AreNeverAcceptedBesideTheTruth) {
       {"every 20th range", keep_every_20th},
       {"first third", [](FlightData& f) { keep_part(f, 0, 1.0 / 3); }},
       {"one side", keep_one_side},
+      {"one side 0.5 m late", delay_one_side},
+      {"lever arm 0.3 m off", declare_arm_wrongly},
       {"anchors exchanged", exchange_two_anchors_half_way},
   };
   int anchors = 0, accepted = 0, outside = 0;

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 #include <sys/wait.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdio>
@@ -206,6 +207,7 @@ TEST_F(SolveCommand, RefusesWhatWouldDoNothing) {
   refused("--likelihood loss", "--models");
   refused("--truth anchors_truth.csv", "--report");
   refused("--bias 1e9", "200");
+  refused("--lever-arm-sigma 0", "--lever-arm-sigma");
   const fs::path kit = folder_ / "kit.json";
   ASSERT_EQ(run("profile fit " + quoted() + " --out '" + kit.string() + "'").exit_code, 0);
   std::stringstream text;
@@ -214,6 +216,21 @@ TEST_F(SolveCommand, RefusesWhatWouldDoNothing) {
   json["kit"] = "another kit";
   std::ofstream(kit) << json.dump();
   refused("--profile '" + kit.string() + "'", "another kit");
+}
+
+TEST_F(SolveCommand, WidensRegionsByTheSigmaOfTheLeverArmAndAsksNoMore) {
+  const auto first = [&](const std::string& options) {
+    return nlohmann::json::parse(
+        run("solve " + quoted() + " --format json " + options).out)["flights"][0]["anchors"][0];
+  };
+  const auto asked = [](const nlohmann::json& anchor) {
+    return std::ranges::any_of(anchor["gates"],
+                               [](const auto& gate) { return gate["name"] == "unseen_arm"; });
+  };
+  const auto without = first(""), with = first("--lever-arm-sigma 0.5");
+  EXPECT_TRUE(asked(without));
+  EXPECT_FALSE(asked(with));
+  EXPECT_GT(with["h95_m"].get<double>(), without["h95_m"].get<double>());
 }
 
 TEST_F(SolveCommand, HoldsTheHeightInTheMetresOfItsOwnTable) {

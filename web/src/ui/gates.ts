@@ -51,6 +51,11 @@ const WORDS: Record<string, Words> = {
   moved: { passes: 'It is where it was', fails: 'It moved, or one of the answers is wrong', unit: 'χ²' },
   bias: { passes: 'Range bias of the kit is known, σ', fails: 'Range bias of the kit is not known, σ', unit: 'm' },
   lever_arm: { passes: 'The lever arm fits the flight', fails: 'The lever arm does not fit the flight', unit: 'σ' },
+  unseen_arm: {
+    passes: 'A wrong lever arm would show or stay within the region, unseen error',
+    fails: 'A wrong lever arm would not show: the aircraft turned too little, unseen error',
+    unit: 'm',
+  },
   settled: { passes: 'The joint solution settled', fails: 'The joint solution did not settle, rounds', unit: '' },
   goal_h95_m: {
     passes: 'Accuracy goal reached, 95 % horizontal',

@@ -1,0 +1,169 @@
+// A lever arm that is wrong, where the flight shows it and where it does not. Expected values are algebra:
+// where the heading stays, ranges from antennas that are all off by e are the ranges of anchors that are off
+// by -e.
+#include "core/localize/unseen_arm.hpp"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "core/localize/flight_solver.hpp"
+#include "tests/core/localize/flight_support.hpp"
+
+namespace anchord {
+namespace {
+
+using testing::MadeFlight;
+using testing::make_flight;
+
+constexpr double k_asked_m = 0.3;
+
+const Gate* unseen(const AnchorSolution& anchor) {
+  const auto& gates = anchor.estimate.gates;
+  const auto at = std::ranges::find(gates, "unseen_arm", &Gate::name);
+  return at == gates.end() ? nullptr : &*at;
+}
+
+FlightSolution solved(const FlightData& flight, const FlightOptions& options = {}) {
+  return solve_flight(flight, options).value();
+}
+
+/// The same heading for the whole flight.
+FlightData with_heading(const MadeFlight& made, double heading_rad) {
+  FlightData flight = make_flight(made);
+  for (Fix& fix : flight.fixes)
+    fix.enu_from_body = Eigen::Quaterniond(Eigen::AngleAxisd(heading_rad, Eigen::Vector3d::UnitZ()));
+  return flight;
+}
+
+TEST(UnseenArm, MovesEveryAnchorByTheWholeErrorWhereTheHeadingStays) {
+  for (const double heading_rad : {0.0, 1.0, -2.5}) {
+    for (const auto& anchor : solved(with_heading(MadeFlight{}, heading_rad)).anchors) {
+      const Gate* gate = unseen(anchor);
+      ASSERT_NE(gate, nullptr);
+      EXPECT_NEAR(gate->value.value(), k_asked_m, 0.01) << heading_rad;  // weak priors hold a little of it
+      EXPECT_FALSE(gate->passed);
+      EXPECT_FALSE(anchor.estimate.acceptable());
+      // What to do.
+      EXPECT_NE(gate->why.find("quarter turn"), std::string::npos) << gate->why;
+      EXPECT_NE(gate->why.find("lever_arm_sigma_m"), std::string::npos) << gate->why;
+    }
+  }
+}
+
+TEST(UnseenArm, IsWhatAWrongArmDoesToTheAnswer) {
+  MadeFlight made;
+  made.noise_m = 0.005;
+  const FlightSolution right = solved(make_flight(made));
+  made.arm_error_m = {0.18, -0.24, 0};  // 0.3 m long; heading east: body and map axes are the same
+  const FlightSolution wrong = solved(make_flight(made));
+  for (std::size_t i = 0; i < made.anchors.size(); ++i) {
+    const Eigen::Vector3d moved =
+        wrong.anchors[i].estimate.best->position.m - right.anchors[i].estimate.best->position.m;
+    EXPECT_NEAR((moved + made.arm_error_m).norm(), 0, 0.01) << i;
+    EXPECT_FALSE(wrong.anchors[i].estimate.acceptable());
+  }
+}
+
+TEST(UnseenArm, IsSeenByAnAircraftThatTurns) {
+  MadeFlight made;
+  made.turn_rate_radps = 0.2;
+  for (const auto& anchor : solved(make_flight(made)).anchors) {
+    const Gate* gate = unseen(anchor);
+    ASSERT_NE(gate, nullptr);
+    EXPECT_TRUE(gate->passed) << gate->why;
+    EXPECT_LT(gate->value.value(), 0.1);
+    EXPECT_TRUE(anchor.estimate.acceptable());
+  }
+}
+
+// What the sentence tells the operator to do.
+TEST(UnseenArm, IsSeenWhereTheHeadingIsAQuarterTurnAwayForTwentySeconds) {
+  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+    MadeFlight made;
+    made.seed = seed;
+    FlightData flight = make_flight(made);
+    for (Fix& fix : flight.fixes) {
+      const double t_s = seconds_between(UtcTime{}, fix.time);
+      if (t_s > 50 && t_s < 70)
+        fix.enu_from_body =
+            Eigen::Quaterniond(Eigen::AngleAxisd(std::numbers::pi / 2, Eigen::Vector3d::UnitZ()));
+    }
+    for (const auto& anchor : solved(flight).anchors)
+      EXPECT_TRUE(anchor.estimate.acceptable()) << seed << ' ' << unseen(anchor)->why;
+  }
+}
+
+TEST(UnseenArm, WidensRegionsByExactlyTheSigmaThatIsDeclared) {
+  const FlightData flight = make_flight(MadeFlight{});
+  const FlightSolution without = solved(flight);
+  for (const double sigma_m : {0.02, 0.15}) {
+    FlightOptions options;
+    options.lever_arm_sigma_m = sigma_m;
+    const FlightSolution with = solved(flight, options);
+    for (std::size_t i = 0; i < with.anchors.size(); ++i) {
+      const Eigen::Matrix3d more_m2 =
+          with.anchors[i].estimate.best->covariance_m2 - without.anchors[i].estimate.best->covariance_m2;
+      Eigen::Matrix3d expected_m2 = Eigen::Matrix3d::Zero();
+      expected_m2(0, 0) = expected_m2(1, 1) = sigma_m * sigma_m;
+      EXPECT_NEAR((more_m2 - expected_m2).norm(), 0, 0.05 * sigma_m * sigma_m) << sigma_m << ' ' << i;
+      EXPECT_EQ(unseen(with.anchors[i]), nullptr);
+      EXPECT_EQ(with.anchors[i].estimate.best->position.m, without.anchors[i].estimate.best->position.m);
+      ASSERT_TRUE(with.anchors[i].budget.has_value());
+      EXPECT_NEAR(with.anchors[i].budget->trace_m2(ErrorSource::lever_arm) -
+                      without.anchors[i].budget->trace_m2(ErrorSource::lever_arm),
+                  2 * sigma_m * sigma_m, 0.1 * sigma_m * sigma_m);
+    }
+  }
+}
+
+TEST(UnseenArm, IsHeldByTheRegionsOfASigmaThatFits) {
+  MadeFlight made;
+  made.arm_error_m = {0.18, -0.24, 0};
+  FlightOptions options;
+  options.lever_arm_sigma_m = 0.2;
+  const FlightSolution solution = solved(make_flight(made), options);
+  for (std::size_t i = 0; i < made.anchors.size(); ++i) {
+    const Estimate& estimate = solution.anchors[i].estimate;
+    const Eigen::Vector3d off = estimate.best->position.m - made.anchors[i];
+    EXPECT_LT(off.dot(estimate.best->covariance_m2.inverse() * off), 7.815) << i;  // 95 %, three degrees
+  }
+}
+
+TEST(UnseenArm, IsNotAskedWhereTheTrackIsOfTheTagOrTheArmIsSolvedFor) {
+  FlightData flight = make_flight(MadeFlight{});
+  FlightOptions free;
+  free.lever_across_prior_m = 0.3;
+  for (const auto& anchor : solved(flight, free).anchors) EXPECT_EQ(unseen(anchor), nullptr);
+  flight.mission.point = TrackPoint::tag_antenna;
+  for (const auto& anchor : solved(flight).anchors) EXPECT_EQ(unseen(anchor), nullptr);
+}
+
+TEST(UnseenArm, IsTheArmItselfWhereTheTrackHasNoHeading) {
+  FlightData flight = make_flight(MadeFlight{});
+  for (Fix& fix : flight.fixes) fix.enu_from_body.reset();
+  for (const auto& anchor : solved(flight).anchors) EXPECT_EQ(unseen(anchor), nullptr);
+  for (TagAntenna& tag : flight.mission.tags) tag.lever_arm_body_m = {0.3, 0.4, 0};
+  for (const auto& anchor : solved(flight).anchors) {
+    const Gate* gate = unseen(anchor);
+    ASSERT_NE(gate, nullptr);
+    EXPECT_NEAR(gate->value.value(), 0.5, 1e-6);
+    EXPECT_FALSE(gate->passed);
+    EXPECT_NE(gate->why.find("record the attitude"), std::string::npos) << gate->why;
+  }
+}
+
+TEST(UnseenArm, RefusesASigmaThatIsNone) {
+  for (const double sigma_m : {0.0, -0.1, std::nan("")}) {
+    FlightOptions options;
+    options.lever_arm_sigma_m = sigma_m;
+    EXPECT_FALSE(options.check()) << sigma_m;
+  }
+}
+
+}  // namespace
+}  // namespace anchord
