@@ -57,8 +57,8 @@ export const PAGES: readonly Page[] = [
       {
         list: [
           'In flight: a 360° turn over one point. With a wrong lever arm the residuals of all anchors swing with the heading.',
-          'A flight of one heading shows nothing of a wrong lever arm, and all its anchors are withheld for that; nor does a track without heading. Let the' +
-            ' nose follow the course, or turn once.',
+          'A flight of one heading shows nothing of a wrong lever arm, and its anchors are withheld for that; nor does a track without heading. Let the' +
+            ' nose follow the course, or hold a heading a quarter turn away for 20 s.',
           'After the flight: the calibration solves what is left of it and reports it as the antenna offset of the kit. More than 3 cm: measure again.',
         ],
       },
@@ -325,7 +325,7 @@ export const PAGES: readonly Page[] = [
           [
             'A wrong lever arm would not show',
             'the aircraft kept one heading, or the track has none',
-            'Turn once over a point; or calibrate with the sigma of the measured arm (lever_arm_sigma_m)',
+            'Fly 20 s or more with the heading a quarter turn away; or calibrate with the sigma of the measured arm (lever_arm_sigma_m)',
           ],
           [
             'Not converged in time',
