@@ -209,11 +209,16 @@ export function calibration_of(answer: unknown): Calibration | null {
       .filter((r): r is AnchorRow => r !== null),
   };
 }
-export async function calibrate(mission: string, key: string): Promise<Calibration> {
+/// `lever_arm_sigma_m`: how well the arm was measured; null: nobody says.
+export async function calibrate(
+  mission: string,
+  key: string,
+  lever_arm_sigma_m: number | null = null,
+): Promise<Calibration> {
   const answer = await request(
     'POST',
     '/calibrations',
-    { missions: [mission] },
+    { missions: [mission], ...(lever_arm_sigma_m !== null && { lever_arm_sigma_m }) },
     { Prefer: 'wait=120', 'Idempotency-Key': key },
   );
   const done = calibration_of(answer);

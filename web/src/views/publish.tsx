@@ -29,6 +29,7 @@ import { plan_again } from './plan_again';
 import { draft_key } from './plan/draft';
 import { ReviewAnchor } from './review_anchor';
 import { flying } from './flight/words';
+import { LeverArmSigma } from './lever_arm_sigma';
 
 interface Form {
   readonly note: string;
@@ -58,7 +59,7 @@ export function Publish({ mission }: { mission: MissionMsg }) {
     set_busy('');
   };
   const solve = useStable(
-    (anew: boolean): void =>
+    (anew: boolean, arm_sigma_m: number | null = null): void =>
       void guarded('calibrating', async () => {
         // After landing the server has solved the flight by itself: that is what waits for review.
         const there = solves && anew ? null : await newest_calibration(mission.mission);
@@ -66,7 +67,7 @@ export function Publish({ mission }: { mission: MissionMsg }) {
           there && (!solves || (there.after_landing && !in_air()))
             ? there
             : solves
-              ? await calibrate(mission.mission, keys.current.calibrate)
+              ? await calibrate(mission.mission, keys.current.calibrate, arm_sigma_m)
               : null;
         if (!made) throw new Error('This flight is not solved yet: an engineer has to calibrate it first.');
         set_draft(made);
@@ -96,6 +97,11 @@ export function Publish({ mission }: { mission: MissionMsg }) {
       forget();
       publish_open.value = false;
     });
+  const unseen = draft?.rows.filter((r) => r.gates.some((g) => g.name === 'unseen_arm' && !g.passed)).length ?? 0;
+  const solve_again = (arm_sigma_m: number | null): void => {
+    keys.current.calibrate = idempotency_key();
+    solve(true, arm_sigma_m);
+  };
   const reviewed = draft?.rows.find((r) => r.anchor === picked) ?? null,
     lacking = draft?.rows.filter((r) => !passes(r) || left[r.anchor] !== undefined) ?? [];
   const fly_again = (): void =>
@@ -131,20 +137,13 @@ export function Publish({ mission }: { mission: MissionMsg }) {
             ? 'all stored ranges are solved again, together.'
             : 'the newest calibration that an engineer made of it.'}{' '}
         {solves && draft?.after_landing && (
-          <button
-            class="btn small"
-            data-testid="solve-again"
-            disabled={busy !== ''}
-            onClick={() => {
-              keys.current.calibrate = idempotency_key();
-              solve(true);
-            }}
-          >
+          <button class="btn small" data-testid="solve-again" disabled={busy !== ''} onClick={() => solve_again(null)}>
             Solve again
           </button>
         )}{' '}
         What is published is what facility tools read; the running estimates are not.
       </p>
+      {solves && unseen > 0 && <LeverArmSigma withheld={unseen} busy={busy !== ''} solve={solve_again} />}
       {busy === 'calibrating' && <p role="status">Solving {mission.n_ranges} ranges.</p>}
       {problem && (
         <div class="problem" role="status">

@@ -325,7 +325,7 @@ export const PAGES: readonly Page[] = [
           [
             'A wrong lever arm would not show',
             'the aircraft kept one heading, or the track has none',
-            'Fly 20 s or more with the heading a quarter turn away; or calibrate with the sigma of the measured arm (lever_arm_sigma_m)',
+            'Fly 20 s or more with the heading a quarter turn away; or say in Review how well the arm was measured',
           ],
           [
             'Not converged in time',

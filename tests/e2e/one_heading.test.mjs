@@ -1,0 +1,65 @@
+// A flight of one heading would not show a wrong lever arm: its anchors wait until a person says how well the arm was measured.
+import assert from 'node:assert/strict';
+import { mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
+import { tmpdir } from 'node:os';
+import { join } from 'node:path';
+import { after, before, test } from 'node:test';
+import { openBrowser, openPage, picture, text, violations } from './browser.mjs';
+import { eventually, run, startServer } from './server.mjs';
+
+const folder = mkdtempSync(join(tmpdir(), 'anchord e2e ')),
+  flight = join(folder, 'flight');
+let browser, server;
+
+before(async () => {
+  const made = await run(['simulate', 'flight', '--seed', '7', '--duration', '120', '--out', flight]);
+  assert.equal(made.code, 0, made.stderr);
+  // As logged by an aircraft that looks east all the time.
+  const [head, ...rows] = readFileSync(join(flight, 'track.csv'), 'utf8').trim().split('\n'),
+    from = head.split(',').indexOf('qx');
+  const east = rows.map((row) => [...row.split(',').slice(0, from), 0, 0, 0, 1].join());
+  writeFileSync(join(flight, 'track.csv'), `${[head, ...east].join('\n')}\n`);
+  const about = JSON.parse(readFileSync(join(flight, 'flight.json'), 'utf8'));
+  about.tags[0].lever_arm_body_m = [0, 0, -0.28];
+  writeFileSync(join(flight, 'flight.json'), JSON.stringify(about));
+  server = await startServer({ auth: 'off' });
+  const imported = await run(['import', 'flight', flight, '--url', server.url]);
+  assert.equal(imported.code, 0, imported.stderr);
+  browser = await openBrowser();
+});
+after(async () => {
+  await browser?.close();
+  await server?.dispose();
+  rmSync(folder, { recursive: true, force: true });
+});
+
+test('anchors are withheld with the reason, and accepted once the sigma of the lever arm is given', async () => {
+  const { page, seen, id } = await openPage(browser, server, { hash: '#/anchors' });
+  await id('review').click();
+  await id('draft').waitFor({ timeout: 60_000 });
+  const calibrations = async () => (await (await server.fetch('/api/v1/calibrations')).json()).items,
+    before_it = (await calibrations()).length;
+  const rows = id('draft').locator('tbody tr'),
+    n = await rows.count();
+  assert.ok(n >= 5, `${n} anchors`);
+  for (const row of await rows.all()) assert.match(await text(row), /A wrong lever arm would not show.*0\.30 m/);
+  const asked = id('lever-arm-sigma');
+  assert.match(await text(asked), new RegExp(`withholds ${n} anchors`));
+  const again = asked.getByRole('button', { name: 'Solve again' });
+  for (const wrong of ['', '0', '-0.02', 'two']) {
+    await asked.getByRole('textbox').fill(wrong);
+    assert.equal(await again.isDisabled(), true, wrong);
+  }
+  assert.deepEqual(await violations(page), []);
+  await asked.getByRole('textbox').fill('0,03');
+  await picture(page, 'one-heading');
+  await again.click();
+  await asked.waitFor({ state: 'detached', timeout: 60_000 });
+  assert.equal(await id('publish-now').isEnabled(), true);
+  const passed = (await text(id('draft'))).match(/accepted/g).length;
+  assert.ok(passed >= n - 1, `${passed} of ${n}`);
+  assert.equal((await calibrations()).length, before_it + 1);
+  await eventually('it can be published', async () => (await text(id('publish-now'))).includes(`${passed} of ${n}`));
+  assert.deepEqual(seen.errors, []);
+  await page.close();
+});
