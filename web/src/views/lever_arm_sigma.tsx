@@ -26,19 +26,19 @@ export function LeverArmSigma({ withheld, busy, solve }: Props) {
         A wrong lever arm would not show in this flight, which withholds {withheld} anchor{withheld === 1 ? '' : 's'}.
         If the arm was measured with care, say how well; the accuracies then hold it.
       </p>
-      <label>
-        Lever arm, one sigma, m{' '}
+      <div class="one-line">
+        <label for="arm-sigma">Lever arm, one sigma, m</label>
         <input
-          size={6}
+          id="arm-sigma"
           inputMode="decimal"
           value={typed}
           aria-invalid={!good}
           onInput={(e) => set_typed(e.currentTarget.value)}
         />
-      </label>{' '}
-      <button class="btn small" disabled={busy || !good}>
-        Solve again
-      </button>
+        <button class="btn small" disabled={busy || !good}>
+          Solve again
+        </button>
+      </div>
     </form>
   );
 }
