@@ -34,13 +34,15 @@ enum class Failure : std::uint8_t {
 };
 
 /// Thrown inside server/storage only; the write queue and the reader pool turn it into an Error.
-class SqlError : public std::runtime_error {
+class SqlError : public std::exception {
  public:
-  SqlError(Failure failure, const std::string& text) : std::runtime_error(text), failure_(failure) {}
+  SqlError(Failure failure, std::string text) : failure_(failure), text_(std::move(text)) {}
   Failure failure() const { return failure_; }
+  const char* what() const noexcept override { return text_.c_str(); }
 
  private:
   Failure failure_;
+  std::string text_;  // its own: a copy is kept for other threads, and runtime_error's copies share theirs
 };
 
 Error to_error(const SqlError& error);

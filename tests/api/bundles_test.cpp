@@ -92,7 +92,8 @@ class Bundles : public AppFixture {
     n_ranges_ = flight.ranges.size();
     ASSERT_TRUE(s.measurements.append_fixes(flight.fixes, true));
     ASSERT_TRUE(s.measurements.append_ranges(flight.ranges, true));
-    for (const auto& device : s.measurements.devices(id_).value()) {
+    const auto devices = s.measurements.devices(id_);
+    for (const auto& device : devices.value()) {
       if (device.kind != DeviceSeen::Kind::anchor) continue;
       ASSERT_TRUE(s.anchors.find_or_create(device.network_id, clock_.now()));
     }

@@ -51,6 +51,7 @@ class Calibrations : public AppFixture {
  protected:
   static MadeFlight made(std::uint64_t seed) {
     MadeFlight m;
+    m.turn_rate_radps = 0.2;  // else a wrong lever arm would not show
     m.seed = seed;
     m.frame = TrackFrame::wgs84;
     return m;

@@ -215,7 +215,8 @@ TEST_F(PlanInFlight, OtherTargetsAndAnchorsCountAtOnce) {
   EXPECT_EQ(procedure()["target_sigma_m"], 0.02);
   const double end_s = drone_->now + 60;
   while (procedure()["anchors"].empty() && drone_->now < end_s) measure(1);
-  for (const auto& task : procedure()["anchors"])
+  const Json now = procedure();
+  for (const auto& task : now["anchors"])
     EXPECT_EQ(task["target_sigma_m"], task["network_id"] == "0x6a21" ? 0.015 : 0.02) << task;
 }
 
