@@ -55,7 +55,8 @@ Ordered anchors_json(const procedure::FlightEngine& engine) {
 }  // namespace
 
 Ordered drone_json(const DroneStatus& d) {
-  // An aircraft of which nothing was received has been silent since the start of the server, which says nothing of the aircraft.
+  // An aircraft of which nothing was received has been silent since the start of the server, which says
+  // nothing of the aircraft.
   const bool heard = d.connected || d.identity.system != 0;
   Ordered others = Ordered::array();
   for (const auto& o : d.others) {

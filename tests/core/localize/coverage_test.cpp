@@ -88,7 +88,7 @@ TEST(Coverage, HoldsWhereOneSideIsLateAlike) {
   int accepted = 0, far_outside = 0;
   for (const double share : {0.15, 0.3, 0.5, 0.7}) {
     const Coverage one = covered(Spoilage::late_side, share, 40);
-    EXPECT_GE(one.share(), 0.9) << share;
+    EXPECT_GE(one.share(), 0.93) << share;
     accepted += one.accepted;
     far_outside += one.far_outside;
   }
@@ -155,8 +155,13 @@ TEST(Coverage, HoldsWhereTheLeverArmIsDeclaredWrongly) {
     }
     std::printf("wrong arm, heading %s: %d of %d accepted, %d of them inside\n", word(heading), accepted,
                 anchors, inside);
-    // Few are accepted where the heading stays, those of wide regions: the misses count against all anchors.
-    EXPECT_LE(20 * (accepted - inside), anchors) << word(heading);
+    // Where the heading hardly changes few are accepted, those of wide regions: the misses count against all
+    // anchors.
+    if (heading == Heading::along_the_course || heading == Heading::turning) {
+      EXPECT_GE(100 * inside, 93 * accepted) << word(heading);
+    } else {
+      EXPECT_LE(20 * (accepted - inside), anchors) << word(heading);
+    }
     EXPECT_EQ(far_outside, 0) << word(heading);
   }
 }

@@ -164,11 +164,11 @@ export async function run_numbers(run: Run): Promise<RunNumbers> {
   const of = { path: { id: run.id } },
     none = (): null => null,
     finished = run.state === 'succeeded',
-    tells = finished && !is_bias(run.task);
+    classifies = finished && !is_bias(run.task);
   const [dataset, confusion, roc, cdf, grid] = await Promise.all([
     get('/datasets/{id}', { path: { id: run.dataset_id } }).catch(none),
-    tells ? get('/training-runs/{id}/confusion', of).catch(none) : null,
-    tells ? get('/training-runs/{id}/roc', of).catch(none) : null,
+    classifies ? get('/training-runs/{id}/confusion', of).catch(none) : null,
+    classifies ? get('/training-runs/{id}/roc', of).catch(none) : null,
     finished ? get('/training-runs/{id}/cdf', of).catch(none) : null,
     finished ? get('/training-runs/{id}/grid', of).catch(none) : null,
   ]);
