@@ -2,7 +2,7 @@
 // simulated aircraft at the other end of MAVLink, its tag and rover through REST; in real time, so only the beginning of a flight.
 import assert from 'node:assert/strict';
 import { after, before, test } from 'node:test';
-import { openBrowser, openPage, picture, text, violations } from './browser.mjs';
+import { confirmed, openBrowser, openPage, picture, text, violations } from './browser.mjs';
 import { eventually } from './server.mjs';
 import { serverWithAircraft } from './simulated_aircraft.mjs';
 
@@ -217,9 +217,7 @@ test('start is blocked until the checklist is green; then the aircraft flies, ho
   await hold(page, id('cmd-resume'));
   await id('procedure').getByText('RUNNING', { exact: true }).waitFor({ timeout: 10_000 });
   // A short tap asks, a second one confirms: nothing needs a steady finger.
-  await id('cmd-land').click();
-  await id('cmd-land').getByText('tap again').waitFor();
-  await id('cmd-land').click();
+  await confirmed(id('cmd-land'), 'click');
   await id('procedure').getByText('ABORTED', { exact: true }).waitFor({ timeout: 60_000 });
   assert.match(await text(id('flight-aborted')), /ended before its plan was flown.*Commanded to land: by /);
   // What the flight took stands still once it is over, and what is done is counted alike everywhere: no more than the procedure reached.
