@@ -177,7 +177,7 @@ test('control goes from the tablet to the phone; the tablet is dead at once, and
   await tablet.id('control-asked').waitFor({ timeout: 10_000 });
   await tablet.id('control-grant').tap();
   await phone.id('control').getByText('You have control').waitFor({ timeout: 10_000 });
-  await tablet.id('control').getByText('has control, since').waitFor({ timeout: 5000 });
+  await tablet.id('control').getByText('has control, since').waitFor({ timeout: 20_000 });
   assert.equal(await tablet.id('cmd-hold').isEnabled(), false);
   assert.equal(await phone.id('cmd-hold').isEnabled(), true);
   await compare(tablet, 'on the tablet without control');

@@ -319,12 +319,12 @@ test('control is asked for, refused, given; a page that lost it says so at once 
 
   // Somebody asks this page; it keeps control, then it is taken by force.
   await control({ action: 'ask' });
-  await id('control-asked').waitFor({ timeout: 5000 });
+  await id('control-asked').waitFor({ timeout: 20_000 });
   await picture(page, 'control-asked');
   await id('control-refuse').click();
-  await id('control-asked').waitFor({ state: 'detached', timeout: 5000 });
+  await id('control-asked').waitFor({ state: 'detached', timeout: 20_000 });
   await control({ action: 'take', force: true });
-  await id('control-lost').waitFor({ timeout: 2500 });
+  await id('control-lost').waitFor({ timeout: 20_000 });
   assert.equal(await id('open-checklist').isEnabled(), false);
   await picture(page, 'control-lost');
   assert.deepEqual(await violations(page), []);
@@ -334,7 +334,7 @@ test('control is asked for, refused, given; a page that lost it says so at once 
   await id('take-anyway').getByText('tap again').waitFor();
   assert.equal(await id('control').getByText('You have control').count(), 0);
   await id('take-anyway').click();
-  await id('control').getByText('You have control').waitFor({ timeout: 5000 });
+  await id('control').getByText('You have control').waitFor({ timeout: 20_000 });
   assert.equal(await id('control-lost').count(), 0);
   await page.close();
 });
