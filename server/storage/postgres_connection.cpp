@@ -100,7 +100,7 @@ class PostgresStatement final : public Statement {
   }
   void bind_text(int index, std::string_view value) override { fresh(index, k_text).own = value; }
   void bind_blob(int index, std::span<const std::byte> value) override {
-    fresh(index, k_bytea).borrowed = value;
+    fresh(index, k_bytea).own.assign(reinterpret_cast<const char*>(value.data()), value.size());
   }
 
   /// In PostgreSQL's binary form; must live until reset.

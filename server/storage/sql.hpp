@@ -47,7 +47,7 @@ class SqlError : public std::exception {
 
 Error to_error(const SqlError& error);
 
-/// A prepared statement. Parameters count from 1, columns from 0. A bound blob must live until reset.
+/// A prepared statement. Parameters count from 1, columns from 0. What is bound is copied.
 class Statement {
  public:
   virtual ~Statement() = default;

@@ -88,8 +88,8 @@ class SqliteStatement final : public Statement {
   void bind_blob(int index, std::span<const std::byte> value) override {
     // A null pointer would bind NULL; an empty blob is a value.
     guard([&] {
-      statement_.bindNoCopy(index, value.empty() ? static_cast<const void*>("") : value.data(),
-                            static_cast<int>(value.size()));
+      statement_.bind(index, value.empty() ? static_cast<const void*>("") : value.data(),
+                      static_cast<int>(value.size()));
     });
   }
   bool step() override {

@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -61,6 +62,20 @@ class SeamContract : public testing::TestWithParam<Side> {
   ScratchDir dir_;
   std::unique_ptr<Connection> connection_;
 };
+
+TEST_P(SeamContract, TakesAParameterAsItIsWhenItIsBound) {
+  std::vector<std::byte> bytes(16, std::byte{1});
+  std::string text = "as bound";
+  Query put(*connection_, "INSERT INTO seam (b, t) VALUES (?1, ?2)");
+  put << std::span<const std::byte>(bytes) << text;
+  std::ranges::fill(bytes, std::byte{2});
+  text.replace(0, 2, "no");
+  put.run();
+  Query query(*connection_, "SELECT b, t FROM seam");
+  ASSERT_TRUE(query.step());
+  EXPECT_EQ(query.blob()[0], std::byte{1});
+  EXPECT_EQ(query.text(), "as bound");
+}
 
 TEST_P(SeamContract, KeepsEveryIntegerToItsLastBit) {
   using Limits = std::numeric_limits<std::int64_t>;
