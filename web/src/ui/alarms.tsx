@@ -59,10 +59,12 @@ export function toggle_sound(): void {
     tones('warning');
   }
 }
+let unmute_timer: ReturnType<typeof setTimeout> | undefined;
 export function mute(): void {
   limiter.mute(now_ms() + 120_000);
   if (sound.value === 'on') sound.value = 'muted';
-  setTimeout(() => {
+  clearTimeout(unmute_timer); // of an earlier time: its two minutes are not this one's
+  unmute_timer = setTimeout(() => {
     if (sound.value === 'muted') sound.value = 'on';
   }, 120_000);
 }
