@@ -15,7 +15,7 @@ test('a second tap within four seconds of the question confirms, however late th
 test('a tap from before the question answers nothing, and one answer is taken once', () => {
   expect(new Press().confirms(10)).toBe(false);
   const press = new Press();
-  press.ask(1000); // of a tap at 300, heard of late
+  press.ask(1000); // of a tap at 300, taken up late
   expect(press.confirms(450)).toBe(false); // a double tap
   expect(press.confirms(1200)).toBe(true); // seen, and the page knows of its own picture later
   expect(press.confirms(1300)).toBe(false);
@@ -25,7 +25,7 @@ test('a hold is as long as the finger was down, and no longer', () => {
   press.down(0);
   expect(press.held_until(999)).toBe(false);
   press.down(2000);
-  expect(press.held_until(3000)).toBe(true); // of a page that heard of both at once
+  expect(press.held_until(3000)).toBe(true); // both taken up at once
   press.down(4000);
   press.left();
   expect(press.held_until(5500)).toBe(false);

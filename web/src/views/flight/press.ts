@@ -1,4 +1,4 @@
-/// What a person meant with a press, judged by when the finger came and went and not by when a slow page heard of it. No DOM; times in ms of one clock,
+/// What a person meant with a press, judged by when the finger came and went and not by when a slow page took it up. No DOM; times in ms of one clock,
 /// that of Event.timeStamp and performance.now().
 export const HOLD_MS = 1000,
   CONFIRM_MS = 4000;
