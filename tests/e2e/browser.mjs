@@ -53,14 +53,6 @@ export async function openPage(browser, server, { hash = '#/live', theme = 'ligh
   return { page, seen, id: (name) => page.getByTestId(name) };
 }
 
-/** Presses (`how`: click, tap) what asks before it does something; again where it asks again, since a slow machine took too long for its question. */
-export async function confirmed(button, how) {
-  const asked = button.getByText('tap again');
-  await button[how]();
-  await asked.waitFor();
-  for (let presses = 1; presses < 4 && (await asked.isVisible()); presses++) await button[how]();
-}
-
 const shots = process.env.ANCHORD_SHOTS; // a folder: keep pictures of what was tested
 export const picture = async (page, name) => {
   if (shots) await page.screenshot({ path: join(shots, `${name}.png`) });

@@ -78,7 +78,7 @@ test('from an empty server the way leads to the form, and every kind of device h
   for (const kind of kinds) {
     await id('device-kind').selectOption(kind);
     const there = fields[kind];
-    for (const name of there) await field({ id }, name).first().waitFor({ timeout: 20_000 });
+    for (const name of there) await field({ id }, name).first().waitFor({ timeout: 3000 });
     for (const name of of_any.filter((n) => !there.some((t) => String(t) === String(n))))
       if (typeof name === 'string') assert.equal(await field({ id }, name).count(), 0, `${kind} has no ${name}`);
     assert.ok(await id('device-send').isDisabled(), `${kind}: nothing is typed yet`);

@@ -114,7 +114,7 @@ test('what was loaded while nothing else was to be done opens during an outage',
   try {
     await eventually('LOST', async () => (await text(id('status-link'))).includes('LOST'), 12_000);
     await id('nav-system').click();
-    await id('system').waitFor({ timeout: 20_000 });
+    await id('system').waitFor({ timeout: 5000 });
   } finally {
     process.kill(server.pid, 'SIGCONT');
   }

@@ -2,7 +2,7 @@
 // simulated aircraft at the other end of MAVLink, its tag and rover through REST; in real time, so only the beginning of a flight.
 import assert from 'node:assert/strict';
 import { after, before, test } from 'node:test';
-import { confirmed, openBrowser, openPage, picture, text, violations } from './browser.mjs';
+import { openBrowser, openPage, picture, text, violations } from './browser.mjs';
 import { eventually } from './server.mjs';
 import { serverWithAircraft } from './simulated_aircraft.mjs';
 
@@ -217,7 +217,9 @@ test('start is blocked until the checklist is green; then the aircraft flies, ho
   await hold(page, id('cmd-resume'));
   await id('procedure').getByText('RUNNING', { exact: true }).waitFor({ timeout: 10_000 });
   // A short tap asks, a second one confirms: nothing needs a steady finger.
-  await confirmed(id('cmd-land'), 'click');
+  await id('cmd-land').click();
+  await id('cmd-land').getByText('tap again').waitFor();
+  await id('cmd-land').click();
   await id('procedure').getByText('ABORTED', { exact: true }).waitFor({ timeout: 60_000 });
   assert.match(await text(id('flight-aborted')), /ended before its plan was flown.*Commanded to land: by /);
   // What the flight took stands still once it is over, and what is done is counted alike everywhere: no more than the procedure reached.
@@ -319,12 +321,12 @@ test('control is asked for, refused, given; a page that lost it says so at once 
 
   // Somebody asks this page; it keeps control, then it is taken by force.
   await control({ action: 'ask' });
-  await id('control-asked').waitFor({ timeout: 20_000 });
+  await id('control-asked').waitFor({ timeout: 5000 });
   await picture(page, 'control-asked');
   await id('control-refuse').click();
-  await id('control-asked').waitFor({ state: 'detached', timeout: 20_000 });
+  await id('control-asked').waitFor({ state: 'detached', timeout: 5000 });
   await control({ action: 'take', force: true });
-  await id('control-lost').waitFor({ timeout: 20_000 });
+  await id('control-lost').waitFor({ timeout: 2500 });
   assert.equal(await id('open-checklist').isEnabled(), false);
   await picture(page, 'control-lost');
   assert.deepEqual(await violations(page), []);
@@ -334,7 +336,7 @@ test('control is asked for, refused, given; a page that lost it says so at once 
   await id('take-anyway').getByText('tap again').waitFor();
   assert.equal(await id('control').getByText('You have control').count(), 0);
   await id('take-anyway').click();
-  await id('control').getByText('You have control').waitFor({ timeout: 20_000 });
+  await id('control').getByText('You have control').waitFor({ timeout: 5000 });
   assert.equal(await id('control-lost').count(), 0);
   await page.close();
 });

@@ -9,7 +9,7 @@ export const root = resolve(dirname(fileURLToPath(import.meta.url)), '../..');
 export const binary = process.env.ANCHORD_BINARY ?? join(root, 'build/release/anchord');
 
 /** Resolves with the first truthy answer of `probe`, asked again until `deadlineMs`; throws with `what` otherwise. */
-export async function eventually(what, probe, deadlineMs = 30_000, stepMs = 20) {
+export async function eventually(what, probe, deadlineMs = 10_000, stepMs = 20) {
   const end = Date.now() + deadlineMs;
   for (;;) {
     const answer = await probe();

@@ -20,6 +20,16 @@ test('a tap from before the question answers nothing, and one answer is taken on
   expect(press.confirms(1200)).toBe(true); // seen, and the page knows of its own picture later
   expect(press.confirms(1300)).toBe(false);
 });
+test('a hold answers an open question: no single tap confirms after it, though the picture comes later', () => {
+  for (const hold of [(p: Press) => p.held_until(3500), (p: Press) => p.rings(3500, 3500) === 'fire']) {
+    const press = new Press();
+    press.ask(1000);
+    press.down(2500);
+    expect(hold(press)).toBe(true);
+    press.shown(3600);
+    expect(press.confirms(3700)).toBe(false);
+  }
+});
 test('a hold is as long as the finger was down, and no longer', () => {
   const press = new Press();
   press.down(0);

@@ -21,7 +21,7 @@ export class Press {
   /// Whether it was down long enough; it is up now.
   held_until(up_ms: number): boolean {
     const held = this.down_ms !== null && up_ms - this.down_ms >= HOLD_MS;
-    if (held) this.down_ms = null;
+    if (held) this.done();
     return held;
   }
   /// The timer of a hold that was due at `due_ms` has rung. Where it rang late the page slept, and the finger may be up with its event still waiting:
@@ -32,7 +32,7 @@ export class Press {
       this.waited = true;
       return 'wait';
     }
-    this.down_ms = null;
+    this.done();
     return 'fire';
   }
   /// The question is put; nobody sees it before `shown`.
@@ -41,12 +41,17 @@ export class Press {
     this.asked_until_ms = Infinity;
   }
   shown(now_ms: number): void {
-    this.asked_until_ms = now_ms + CONFIRM_MS;
+    if (this.asked_until_ms === Infinity) this.asked_until_ms = now_ms + CONFIRM_MS; // else it is answered already
   }
   /// Whether a tap answers the question: made after it was put, and not too late to have been meant for it.
   confirms(tap_ms: number): boolean {
     const yes = tap_ms > this.asked_ms && tap_ms <= this.asked_until_ms;
-    if (yes) this.asked_until_ms = -Infinity;
+    if (yes) this.done();
     return yes;
+  }
+  /// What is done once answers every question of this press.
+  private done(): void {
+    this.down_ms = null;
+    this.asked_until_ms = -Infinity;
   }
 }
