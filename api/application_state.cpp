@@ -1,0 +1,274 @@
+#include "api/application_state.hpp"
+
+#include <nlohmann/json.hpp>
+
+#include "api/anchors/published_features.hpp"
+#include "api/bundles/bundle_notes.hpp"
+#include "api/calibration/revision_news.hpp"
+#include "api/devices/device_json.hpp"
+#include "api/exchange/anchor_files.hpp"
+#include "api/flight/kept_priors.hpp"
+#include "api/flight/procedure_json.hpp"
+#include "api/mqtt/mqtt_status.hpp"
+#include "core/base/ed25519.hpp"
+#include "core/base/to_wire.hpp"
+#include "core/ports/backups.hpp"
+#include "core/ports/broker.hpp"
+#include "core/ports/devices.hpp"
+#include "core/ports/drone.hpp"
+#include "core/ports/plan_store.hpp"
+
+namespace anchord::api {
+
+Application::State::State(Deps d)
+    : deps(std::move(d)),
+      stores(deps.stores),
+      steady(*deps.steady),
+      late([this](std::string_view what) { deps.log_fault("", what); }),
+      prompt(stores.access, late),
+      running(stores.service, steady),
+      router(
+          stores.access, [this] { return running.now_ns(); }, prompt),
+      hub(deps.clock, "anchord " + deps.build.version),
+      events(hub, deps.clock),
+      alarms(events),
+      signer(ModelSigner::parse_seed(deps.model_key).value()),
+      models(ModelSource(stores.models, signer)),
+      missions({.missions = stores.missions,
+                .measurements = stores.measurements,
+                .sites = stores.sites,
+                .anchors = stores.anchors,
+                .hub = hub,
+                .events = events,
+                .clock = deps.clock,
+                .steady = steady,
+                .live = deps.work.live,
+                .joint = deps.work.joint,
+                .late = late,
+                .exclusions = stores.exclusions,
+                .goal = deps.goal,
+                .device_rows = [this] { return device_rows(); },
+                .predict = [this](const Range& range) { return predict_range(*models.active(), range); },
+                .predict_needs_cir = [this] { return models.active()->needs_cir; },
+                .site_outline = deps.site_outline,
+                .track = deps.track,
+                .kept_priors = [this](const MissionId& id) { return kept_priors(stores.plans, id); }}),
+      structures(stores.places),
+      flights({.missions = missions,
+               .plans = stores.plans,
+               .structures = structures,
+               .hub = hub,
+               .events = events,
+               .clock = deps.clock,
+               .steady = steady,
+               .plan = deps.work.plan,
+               .late = late,
+               .drone = deps.drone,
+               .storage = deps.storage_status,
+               .now_s = deps.flight_clock}),
+      stream({deps.devices, stores.service, stores.missions, events}),
+      housekeeping({stores.bin, running, events, [this] { return router.purge_answers(); },
+                    deps.keep_deleted_ns, deps.housekeeping_by_hand}),
+      ingest(stores.measurements, missions),
+      device_ingest(stores.measurements, missions),
+      demonstration({missions, device_ingest, events, deps.clock, deps.demonstration}),
+      jobs(stores.jobs, hub, deps.clock, deps.work.jobs),
+      geo(deps.geoid_dir),
+      contradictions({stores.anchors, stores.calibrations, stores.revisions, stores.missions, events}),
+      profiles(stores.kits, stores.missions, deps.clock),
+      calibrations({.measurements = stores.measurements,
+                    .missions = stores.missions,
+                    .sites = stores.sites,
+                    .calibrations = stores.calibrations,
+                    .jobs = jobs,
+                    .clock = deps.clock,
+                    .profiles = profiles,
+                    .models = models,
+                    .flight_priors = [this](const MissionId& id) { return kept_priors(stores.plans, id); },
+                    .frames = stores.frames,
+                    .exclusions = stores.exclusions,
+                    .track = deps.track,
+                    .contradictions = contradictions}),
+      training({stores.datasets, stores.training_runs, jobs, events, deps.clock, deps.run_work,
+                deps.build.version, signer}),
+      omlox_locations(hub, stores.missions),
+      omlox_push({anchor_api, stores.places, omlox_locations, deps.web_post}),
+      webhooks({stores.webhooks, deps.web_post, deps.clock, [this] { return running.now_ns(); },
+                deps.webhook_waits_s.empty() ? k_webhook_waits_s : deps.webhook_waits_s, &omlox_push}),
+      audit(stores.access, prompt, deps.clock),
+      admin_api{deps.clock,
+                hub,
+                events,
+                alarms,
+                jobs,
+                stores.jobs,
+                prompt,
+                audit,
+                deps.build,
+                deps.backups,
+                deps.storage_status,
+                [this] { return counts(); },
+                [this] { return device_clock(); },
+                [this] { return drone(); },
+                [this] { return mqtt(); },
+                [this] {
+                  return flights.metrics() +
+                         (deps.broker == nullptr ? "" : broker_metrics(deps.broker->status())) +
+                         deps.metrics_text();
+                },
+                deps.support_files},
+      device_api{deps.devices, stores.measurements, stream, jobs, audit},
+      mission_api{
+          missions,     stores.missions, stores.measurements,  stores.sites, stores.bin, stream, events,
+          housekeeping, running,         deps.keep_deleted_ns, deps.clock,   audit,      flights},
+      measurement_api{stores.measurements, ingest, missions,     models, stores.exclusions, events,
+                      deps.clock,          audit,  demonstration},
+      anchor_answers(stores.revisions, contradictions),
+      anchor_api{stores.sites,
+                 stores.anchors,
+                 stores.calibrations,
+                 stores.revisions,
+                 stores.frames,
+                 missions,
+                 geo,
+                 contradictions,
+                 deps.clock,
+                 audit},
+      calibration_api{calibrations,
+                      stores.calibrations,
+                      stores.revisions,
+                      stores.sites,
+                      stores.anchors,
+                      stores.missions,
+                      missions,
+                      contradictions,
+                      profiles,
+                      jobs,
+                      hub,
+                      events,
+                      deps.clock,
+                      audit,
+                      "anchord " + deps.build.version},
+      planning_api{stores.plans,
+                   stores.sites,
+                   deps.clock,
+                   audit,
+                   [this](const PlanId& id) { return flights.flown_with(id); },
+                   [this](const Plan& plan) { flights.plan_saved(plan); },
+                   structures},
+      flight_api{flights, mission_api, events, audit},
+      publisher({hub, stores.missions, stores.sites, stores.revisions,
+                 [this] {
+                   std::uint64_t newest = 0;
+                   return published_features(anchor_api, std::nullopt, newest);
+                 },
+                 steady, deps.mqtt_prefix, deps.build.version}),
+      exchange_api{anchor_api, stores.missions, stores.measurements, stores.places, deps.geopackage},
+      webhook_api{stores.webhooks, webhooks, deps.web_post, deps.clock, audit},
+      omlox_api{anchor_api, stores.places, omlox_locations, deps.clock},
+      place_api{stores.places, stores.sites, jobs,  deps.run_plan_work,
+                deps.clock,    steady,       audit, [this] { structures.changed(); }},
+      bundle_api{
+          .bundles = stores.bundles,
+          .clock = deps.clock,
+          .audit = audit,
+          .made_by = "anchord " + deps.build.version,
+          .spool = deps.spool_dir,
+          .named = [this](const Request& request) { return named_mission(mission_api, request); },
+          .notes = [this](const Mission& mission,
+                          const Principal& who) { return bundle_notes(events, stores.access, mission, who); },
+          .taken = [this](const MissionId& id, const std::string& text,
+                          bool published) { announce_bundle(calibration_api, id, text, published); },
+          .calibrations = stores.calibrations,
+          .revisions = stores.revisions,
+          .key = signer.key(),
+          .ask = [this](Request& request) { return router.handle(request); },
+          .measurements = stores.measurements,
+          .feature_file = deps.feature_file},
+      learning_stores{stores.campaigns, stores.labels, stores.datasets, stores.training_runs, stores.models},
+      learning_api{
+          learning_stores,
+          training,
+          models,
+          stores.measurements,
+          stores.missions,
+          stores.exclusions,
+          jobs,
+          stores.jobs,
+          events,
+          [this](const std::string& code, const std::string& text) { missions.note_in_flights(code, text); },
+          deps.clock,
+          audit} {
+  missions.observe(&flights);
+  mission_api.flight = flight_actions(flight_api);
+  anchor_api.answers = &anchor_answers;
+  anchor_api.file = [this](std::string_view format, const Request& request) {
+    return anchor_file(exchange_api, format, request);
+  };
+  add_routes();
+  events.on_event([this](const LiveEvent& event) { webhooks.notify(event); });
+}
+
+void Application::State::add_routes() {
+  router.on_fault(deps.log_fault);
+  add_mission_routes(router, mission_api);
+  add_mission_bin_routes(router, mission_api);
+  add_measurement_routes(router, measurement_api);
+  add_site_routes(router, anchor_api);
+  add_anchor_routes(router, anchor_api);
+  add_calibration_routes(router, calibration_api);
+  add_comparison_routes(router, calibration_api);
+  add_datum_routes(router, calibration_api);
+  add_kit_routes(router, calibration_api);
+  add_frame_routes(router, anchor_api);
+  add_exclusion_routes(router, measurement_api);
+  add_device_routes(router, device_api);
+  add_job_routes(router, admin_api);
+  add_plan_routes(router, planning_api);
+  add_flight_routes(router, flight_api);
+  add_plan_change_routes(router, flight_api);
+  add_campaign_routes(router, learning_api);
+  add_dataset_routes(router, learning_api);
+  add_training_run_routes(router, learning_api);
+  add_model_routes(router, learning_api);
+  add_access_routes(router, deps.access);
+  add_alarm_routes(router, admin_api);
+  add_backup_routes(router, admin_api);
+  add_system_routes(router, admin_api);
+  add_ogc_routes(router, exchange_api);
+  add_anchor_file_routes(router, exchange_api);
+  add_webhook_routes(router, webhook_api);
+  add_omlox_routes(router, omlox_api);
+  add_building_routes(router, place_api);
+  add_floor_routes(router, place_api);
+  add_floor_plan_routes(router, place_api);
+  add_bundle_routes(router, bundle_api);
+  add_handover_routes(router, bundle_api);
+}
+
+ServerCounts Application::State::counts() const {
+  const auto& lines = ingest.counters();
+  return {missions.recording(), missions.queued(), missions.followed(), missions.evicted(),
+          lines.accepted,       lines.duplicates,  lines.rejected};
+}
+
+nlohmann::ordered_json Application::State::device_clock() const { return clock_json(deps.devices.clock()); }
+
+nlohmann::ordered_json Application::State::drone() const {
+  return deps.drone == nullptr ? nlohmann::ordered_json(nullptr) : drone_json(deps.drone->status());
+}
+
+nlohmann::ordered_json Application::State::mqtt() const {
+  return deps.broker == nullptr ? nlohmann::ordered_json(nullptr) : broker_json(deps.broker->status());
+}
+
+/// Rows of topic `devices` for what is set up here.
+std::string Application::State::device_rows() {
+  std::string out;
+  for (const auto& device : deps.devices.devices()) {
+    out += (out.empty() ? "" : ",") + to_wire(device_row_json(device));
+  }
+  return out;
+}
+
+}  // namespace anchord::api
