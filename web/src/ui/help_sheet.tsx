@@ -1,5 +1,5 @@
 /// Help: what is on the screen in words, and the keys. A chunk of its own.
-import { help_open, keys_on, set_keys } from './help';
+import { help_open, keys_on, set_keys } from './help_state';
 import { Icon } from './marks';
 import { useLater } from './use_later';
 import { useDialog } from './use_dialog';

@@ -3,7 +3,7 @@ import { chosen_anchor, current_scene } from '../state/store';
 import { hold_now } from '../views/flight/commands';
 import { by_urgency } from './alarm_rules';
 import { acknowledge, alarms, mute } from './alarms';
-import { help_open, keys_on } from './help';
+import { help_open, keys_on } from './help_state';
 import { next_theme } from './theme';
 
 function step_anchor(by: number): void {

@@ -3,7 +3,7 @@ import { ApiError } from '../api/client';
 import { me, sign_in, sign_out } from '../state/session';
 import { live_source, synced } from '../state/store';
 import { Icon } from './marks';
-import { close_sign_in } from './sign_in';
+import { close_sign_in } from './sign_in_state';
 import { useDialog } from './use_dialog';
 
 /// A small sheet, no redirect: the last picture stays behind it.

@@ -20,7 +20,7 @@ import { fix_word } from './alarm_rules';
 import { age, bytes, clock, fixed, millimetres } from './format';
 import { Icon, Mark, type Shape, type Tone } from './marks';
 import { next_theme, theme } from './theme';
-import { open_sign_in } from './sign_in';
+import { open_sign_in } from './sign_in_state';
 import { useDialog } from './use_dialog';
 
 export const open_card = signal<string | null>(null);

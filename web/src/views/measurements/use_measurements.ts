@@ -13,7 +13,7 @@ import {
 } from '../../api/measurements';
 import { mission_id, ordered_missions } from '../../state/store';
 import { grouped } from '../../ui/format';
-import { keys_on } from '../../ui/help';
+import { keys_on } from '../../ui/help_state';
 import { useStable } from '../../ui/use_stable';
 import { DRAWN_MAX, every_of } from './choice';
 import type { Who } from './filters';
