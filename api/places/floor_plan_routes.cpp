@@ -25,19 +25,33 @@ using Ordered = nlohmann::ordered_json;
 
 namespace {
 
-/// Held while a picture is read: its file, the message to the worker and the worker's memory are there once.
+constexpr std::size_t k_pictures_at_once = 2;
+
+/// Held while a picture is read, never while its bytes arrive: a slow link would keep the place.
 class Reading {
  public:
-  explicit Reading(PlaceApi& s) : reading_(s.reading) {
-    if (reading_.exchange(true))
-      throw_problem(503, "overloaded", "another plan is being read: send this one again in a moment");
+  Reading(PlaceApi& s, const Request& request) : reading_(s.reading), token_(request.principal.token_id) {
+    auto reading = reading_.lock();
+    if (reading->contains(token_))
+      throw_problem(
+          429, "rate-limited",
+          "another plan of this token is being read: wait for its answer, then send this one again");
+    if (reading->size() >= k_pictures_at_once)
+      throw_problem(503, "overloaded",
+                    std::to_string(k_pictures_at_once) +
+                        " plans of others are being read: send this one again in a moment");
+    reading->insert(token_);
   }
-  ~Reading() { reading_ = false; }
+  ~Reading() {
+    auto reading = reading_.lock();
+    reading->erase(token_);
+  }
   Reading(const Reading&) = delete;
   Reading& operator=(const Reading&) = delete;
 
  private:
-  std::atomic<bool>& reading_;
+  Locked<std::set<std::string>>& reading_;
+  const std::string token_;
 };
 
 Floor path_floor(PlaceApi& s, const Request& request) {
@@ -61,6 +75,7 @@ Response answer(int status, const Floor& floor) {
       throw_problem(415, "media-type", error.message);
     case Errc::bad_frame:
     case Errc::invalid_argument:
+    case Errc::no_convergence:
     case Errc::weak_geometry:
       throw_problem(422, "validation", error.message);
     case Errc::link_lost:
@@ -167,8 +182,8 @@ Response put_plan(PlaceApi& s, const Request& request) {
   Floor floor = path_floor(s, request);
   require_match(request, etag(floor));
   const Site site = site_of(s, floor);
-  const Reading held(s);
   std::string picture = picture_of(request);
+  const Reading held(s, request);
   std::optional<Json> drawn;
   if (floor_plan::is_dxf(std::as_bytes(std::span(picture)))) {
     drawn = worked(s, {PlanTask::draw, {}, on_map_m(site)}, picture);
@@ -252,7 +267,7 @@ Response put_georeference(PlaceApi& s, const Request& request) {
     return answer(200, floor);
   }
   if (found.wrong) throw_problem(422, "validation", *found.wrong, {{"/points", "outlier", *found.wrong}});
-  const Reading held(s);
+  const Reading held(s, request);
   place(s, floor, found, bytes);
   value_or_problem(s.places.update(floor, floor.version));
   ++floor.version;

@@ -80,8 +80,18 @@ Result<std::string> draw(std::span<const std::byte> dxf, const std::optional<Eig
       {"drawing_m_from_pixel", {by * m(0, 0), by * m(0, 1), m(0, 2), by * m(1, 0), by * m(1, 1), m(1, 2)}}});
 }
 
+/// The line of JSON of a message; discarded where there is none.
+Json head_of(std::string_view message) {
+  if (!is_plan_work(message)) return Json(Json::value_t::discarded);
+  const auto mark = is_page_work(message) ? k_page_mark.size() : k_mark.size();
+  return Json::parse(message.substr(mark, message.find('\n') - mark), nullptr, false);
+}
+
 /// The error of a program of poppler, with what to do about it.
 Error advised(Error error) {
+  if (error.code == Errc::no_convergence)
+    error.message +=
+        ", which no floor plan needs: export the page as PNG, or again without its filling patterns";
   if (error.code == Errc::unsupported)
     error.message += ": install poppler-utils there, or export the page as PNG";
   if (error.code == Errc::bad_frame) error.message += ": export the PDF again, without a password";
@@ -112,13 +122,23 @@ Result<std::string> page(std::string_view pdf, int number, double wanted_dpi, co
 bool is_plan_work(std::string_view message) { return message.starts_with(k_mark); }
 bool is_page_work(std::string_view message) { return message.starts_with(k_page_mark); }
 
+int plan_work_cpu_s(std::string_view message) {
+  const auto head = head_of(message);
+  return head.is_object() ? head.value("cpu_s", k_picture_cpu_s) : k_picture_cpu_s;
+}
+
+Error too_busy(int cpu_s) {
+  return make_error(Errc::no_convergence,
+                    "the picture kept its decoder busy for more than " + std::to_string(cpu_s) +
+                        " s of processor time: save it again as a plain PNG, or a simpler or smaller page");
+}
+
 Result<std::string> do_plan_work(std::string_view message, const std::stop_token& stop,
                                  const WorkProgressSink& progress, const RunProgram& run_program) {
   const auto line_end = message.find('\n');
   if (!is_plan_work(message) || line_end == std::string_view::npos)
     return make_error(Errc::bad_frame, "no work on a plan");
-  const auto mark = is_page_work(message) ? k_page_mark.size() : k_mark.size();
-  const auto head = Json::parse(message.substr(mark, line_end - mark), nullptr, false);
+  const auto head = head_of(message);
   const auto bytes = message.substr(line_end + 1);
   try {
     BOOST_OUTCOME_TRY(const auto task, k_task_words.parse("task", head.at("task").get<std::string>()));
@@ -171,7 +191,8 @@ Result<Json> ask_worker(const RunWork& run, const SteadyClock& steady, const Pla
   const auto& m = question.transform.linear;
   const auto& shift = question.transform.shift_m;
   Json head{{"task", k_task_words.word(question.task)},
-            {"enu_from_pixel", {m(0, 0), m(0, 1), shift.x(), m(1, 0), m(1, 1), shift.y()}}};
+            {"enu_from_pixel", {m(0, 0), m(0, 1), shift.x(), m(1, 0), m(1, 1), shift.y()}},
+            {"cpu_s", question.cpu_s()}};
   if (question.site_map_m) head["site_map_m"] = pair_json(*question.site_map_m);
   if (question.task == PlanTask::page) {
     head["page"] = question.page;
@@ -187,9 +208,9 @@ Result<Json> ask_worker(const RunWork& run, const SteadyClock& steady, const Pla
     return late || canceled();
   });
   if (!answer && late)
-    return make_error(Errc::invalid_argument, "the picture kept the server busy for more than " +
-                                                  std::to_string(static_cast<int>(k_plan_work_s)) +
-                                                  " s: save it again as a plain PNG, or smaller");
+    return make_error(Errc::no_convergence,
+                      "the picture was not read within " + std::to_string(static_cast<int>(k_plan_work_s)) +
+                          " s: save it smaller, or send it when the server is less busy");
   BOOST_OUTCOME_TRY(const auto text, answer);
   Json out;
   if (parse_json(text, out) || !out.is_object())

@@ -1,10 +1,12 @@
 #pragma once
 
-#include <atomic>
 #include <functional>
+#include <set>
+#include <string>
 
 #include "api/kit/audit.hpp"
 #include "api/learning/worker_port.hpp"
+#include "core/base/locked.hpp"
 
 namespace anchord {
 class Clock;
@@ -29,8 +31,9 @@ struct PlaceApi {
   Audit audit;
   /// A building, a floor or what is accepted of it was written: what is planned by it is read anew.
   std::function<void()> changed;
-  /// One picture is read at a time: each may take a gigabyte of the worker's.
-  std::atomic<bool> reading{false};
+  /// Tokens whose picture is being read, each one at a time: one that keeps its decoder busy leaves the
+  /// others a place. Not more than k_pictures_at_once: each may take a gigabyte of its worker's.
+  Locked<std::set<std::string>> reading{};
 };
 
 void add_building_routes(Router& router, PlaceApi& api);

@@ -53,6 +53,9 @@ struct JpegFaults {
   bool cut_short;
 };
 
+/// A progressive file has some ten scans. Each is a pass over the whole picture for a few bytes of file.
+constexpr int k_max_jpeg_scans = 500;
+
 extern "C" {
 void anchord_jpeg_exit(j_common_ptr jpeg) {
   auto* faults = reinterpret_cast<JpegFaults*>(jpeg->err);
@@ -65,10 +68,18 @@ void anchord_jpeg_emit(j_common_ptr jpeg, int level) {
   if (level < 0 && (jpeg->err->msg_code == JWRN_JPEG_EOF || jpeg->err->msg_code == JWRN_HIT_MARKER))
     faults->cut_short = true;
 }
+void anchord_jpeg_progress(j_common_ptr jpeg) {
+  if (reinterpret_cast<j_decompress_ptr>(jpeg)->input_scan_number <= k_max_jpeg_scans) return;
+  auto* faults = reinterpret_cast<JpegFaults*>(jpeg->err);
+  std::snprintf(faults->message, sizeof faults->message, "it has more than %d scans", k_max_jpeg_scans);
+  std::longjmp(faults->back, 1);
+}
 }
 
 bool read_jpeg(Bytes bytes, Image& image, JpegFaults& faults) {
   jpeg_decompress_struct jpeg{};
+  jpeg_progress_mgr progress{};
+  progress.progress_monitor = anchord_jpeg_progress;
   jpeg.err = jpeg_std_error(&faults.base);
   faults.base.error_exit = anchord_jpeg_exit;
   faults.base.emit_message = anchord_jpeg_emit;
@@ -77,6 +88,7 @@ bool read_jpeg(Bytes bytes, Image& image, JpegFaults& faults) {
     return false;
   }
   jpeg_create_decompress(&jpeg);
+  jpeg.progress = &progress;
   jpeg_mem_src(&jpeg, reinterpret_cast<const unsigned char*>(bytes.data()), bytes.size());
   jpeg_read_header(&jpeg, TRUE);
   jpeg.out_color_space = JCS_RGB;

@@ -4,6 +4,7 @@
 #include <poll.h>
 #include <signal.h>
 #include <sys/prctl.h>
+#include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -44,8 +45,9 @@ class Pipe {
 
 /// In the new process, where only what is safe after a fork may be called.
 [[noreturn]] void become(char* const* arguments, const char* path, const Pipe& in, const Pipe& out,
-                         const Pipe& complaints) {
+                         const Pipe& complaints, const rlimit& cpu) {
   prctl(PR_SET_PDEATHSIG, SIGKILL);
+  ::setrlimit(RLIMIT_CPU, &cpu);
   ::signal(SIGPIPE, SIG_DFL);
   ::signal(SIGXFSZ, SIG_IGN);  // it may write no file: an error for it, not its end
   ::dup2(in.end(0), STDIN_FILENO);
@@ -54,6 +56,18 @@ class Pipe {
   char* const none[] = {nullptr};
   ::execve(path, arguments, none);
   _exit(127);
+}
+
+/// What is left of cpu_s after the programs before. SIGXCPU says which limit it was: SIGKILL has many
+/// reasons.
+rlimit cpu_left(int cpu_s) {
+  rusage used{};
+  ::getrusage(RUSAGE_CHILDREN, &used);
+  const auto left = std::max<std::int64_t>(cpu_s - used.ru_utime.tv_sec - used.ru_stime.tv_sec, 1);
+  rlimit now{};
+  ::getrlimit(RLIMIT_CPU, &now);
+  now.rlim_cur = std::min(static_cast<rlim_t>(left), now.rlim_max);
+  return now;
 }
 
 /// Reads what there is; false at the end. What goes beyond `most` is counted and left out.
@@ -106,7 +120,7 @@ std::string last_line(std::string_view text) {
 }  // namespace
 
 Result<std::string> run_program(const std::vector<std::string>& command, std::string_view input,
-                                std::size_t max_output) {
+                                std::size_t max_output, int cpu_s) {
   const std::string path = "/usr/bin/" + command.at(0);
   if (::access(path.c_str(), X_OK) != 0)
     return make_error(Errc::unsupported, command[0] + " is not installed on the server");
@@ -118,8 +132,9 @@ Result<std::string> run_program(const std::vector<std::string>& command, std::st
   if (!in.good() || !out.good() || !complaints.good())
     return make_error(Errc::internal, std::string("cannot make a pipe: ") + std::strerror(errno));
   const auto before = ::signal(SIGPIPE, SIG_IGN);
+  const rlimit cpu = cpu_left(cpu_s);
   const pid_t pid = ::fork();
-  if (pid == 0) become(arguments.data(), path.c_str(), in, out, complaints);
+  if (pid == 0) become(arguments.data(), path.c_str(), in, out, complaints, cpu);
   in.close(0);
   out.close(1);
   complaints.close(1);
@@ -136,6 +151,9 @@ Result<std::string> run_program(const std::vector<std::string>& command, std::st
   if (said.more)
     return make_error(Errc::invalid_argument,
                       command[0] + " made more than " + std::to_string(max_output >> 20) + " MiB");
+  if (WIFSIGNALED(status) && WTERMSIG(status) == SIGXCPU)
+    return make_error(Errc::no_convergence,
+                      command[0] + " used up " + std::to_string(cpu_s) + " s of processor time");
   if (status != 0)
     return make_error(Errc::bad_frame, command[0] + " failed (" +
                                            (said.complaint.empty() ? "too large for its memory, or broken"

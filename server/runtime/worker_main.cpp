@@ -39,6 +39,16 @@ void limit(__rlimit_resource what, rlim_t most) {
   setrlimit(what, &now);
 }
 
+/// By SIGXCPU, which names its reason, and a moment later by the SIGKILL of the hard limit.
+void limit_cpu(int seconds) {
+  constexpr rlim_t k_grace_s = 5;
+  rlimit now{};
+  getrlimit(RLIMIT_CPU, &now);
+  now.rlim_max = std::min(static_cast<rlim_t>(seconds) + k_grace_s, now.rlim_max);
+  now.rlim_cur = std::min(static_cast<rlim_t>(seconds), now.rlim_max);
+  setrlimit(RLIMIT_CPU, &now);
+}
+
 /// New sockets and programs are refused from here on: a model file that breaks the trainer gets no further.
 /// `programs` are allowed where the work is to run one, which then has no sockets either.
 void close_the_doors(bool programs) {
@@ -71,14 +81,14 @@ void settle_in(pid_t server) {
 #if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)  // their shadow counts as data
   limit(RLIMIT_DATA, rlim_t{4} << 30);
 #endif
-  limit(RLIMIT_CPU, 24 * 3600);
+  limit_cpu(24 * 3600);
 }
 
 /// Once it is known what the work is, and before any of it is looked at.
 void settle_for(const std::string& message) {
   const bool page = api::is_page_work(message);
   if (api::is_plan_work(message)) see_system_files_only();
-  if (page) limit(RLIMIT_CPU, static_cast<rlim_t>(api::k_plan_work_s));
+  if (api::is_plan_work(message)) limit_cpu(api::plan_work_cpu_s(message));
   close_the_doors(page);
 }
 
@@ -126,9 +136,14 @@ int worker_main() {
           {"detail", p.detail}});
   };
   const bool plan = api::is_plan_work(message);
+  const auto programs = [cpu_s = plan ? api::plan_work_cpu_s(message) : 0](
+                            const std::vector<std::string>& command, std::string_view input,
+                            std::size_t max_output) {
+    return run_program(command, input, max_output, cpu_s);
+  };
   const auto ran = guarded(plan ? "floor plan" : "training", [&] {  // the door of jobs, in this process
     try {
-      result = plan ? api::do_plan_work(message, stop.get_token(), told, run_program)
+      result = plan ? api::do_plan_work(message, stop.get_token(), told, programs)
                     : api::do_work(message, stop.get_token(), told);
     } catch (const std::bad_alloc&) {
       message.clear();

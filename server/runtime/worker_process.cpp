@@ -63,7 +63,7 @@ std::string cause_of(int signal, bool plan) {
 /// A child that is always collected: killed where it still runs when this goes.
 class Child {
  public:
-  Child(pid_t pid, bool plan) : pid_(pid), plan_(plan) {}
+  Child(pid_t pid, std::optional<int> plan_cpu_s) : pid_(pid), plan_cpu_s_(plan_cpu_s) {}
   ~Child() {
     if (pid_ <= 0) return;
     kill();
@@ -72,21 +72,25 @@ class Child {
   Child(const Child&) = delete;
   Child& operator=(const Child&) = delete;
   void kill() const { ::kill(pid_, SIGKILL); }
-  /// Waits for its end; the words for it.
-  std::string end() {
+  /// Waits for its end; the error that it is for the work.
+  Error end(const char* when = "") {
     int status = 0;
     while (::waitpid(pid_, &status, 0) < 0 && errno == EINTR) {
     }
     pid_ = 0;
+    if (WIFSIGNALED(status) && WTERMSIG(status) == SIGXCPU && plan_cpu_s_) return api::too_busy(*plan_cpu_s_);
     if (WIFSIGNALED(status))
-      return "was ended by signal " + std::to_string(WTERMSIG(status)) + " (" + strsignal(WTERMSIG(status)) +
-             "): " + cause_of(WTERMSIG(status), plan_);
-    return "ended with code " + std::to_string(WEXITSTATUS(status)) + " without an answer";
+      return make_error(Errc::link_lost,
+                        "the worker was ended by signal " + std::to_string(WTERMSIG(status)) + " (" +
+                            strsignal(WTERMSIG(status)) +
+                            "): " + cause_of(WTERMSIG(status), plan_cpu_s_.has_value()) + when);
+    return make_error(Errc::link_lost, "the worker ended with code " + std::to_string(WEXITSTATUS(status)) +
+                                           " without an answer" + when);
   }
 
  private:
   pid_t pid_;
-  bool plan_;  ///< it works on the picture of a plan
+  std::optional<int> plan_cpu_s_;  ///< it works on the picture of a plan, for so long
 };
 
 Result<pid_t> spawn(const std::filesystem::path& program, int socket) {
@@ -150,10 +154,9 @@ Result<std::string> run(const std::filesystem::path& program, const std::string&
     return make_error(Errc::internal, std::string("cannot start a worker: ") + std::strerror(errno));
   Socket ours(ends[0]), theirs(ends[1]);
   BOOST_OUTCOME_TRY(const auto pid, spawn(program, theirs.fd()));
-  Child child(pid, api::is_plan_work(message));
+  Child child(pid, api::is_plan_work(message) ? std::optional(api::plan_work_cpu_s(message)) : std::nullopt);
   theirs.close();
-  if (!write_frame(ours.fd(), message))
-    return make_error(Errc::link_lost, "the worker " + child.end() + " before it began");
+  if (!write_frame(ours.fd(), message)) return child.end(" before it began");
   std::optional<Steady::time_point> asked_to_stop;
   std::string text;
   while (true) {
@@ -170,7 +173,7 @@ Result<std::string> run(const std::filesystem::path& program, const std::string&
         continue;
       case FrameRead::closed:
         if (asked_to_stop) return make_error(Errc::canceled, "canceled");
-        return make_error(Errc::link_lost, "the worker " + child.end());
+        return child.end();
       case FrameRead::frame:
         break;
     }

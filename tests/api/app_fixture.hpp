@@ -79,6 +79,7 @@ class AppFixture : public ::testing::Test {
     std::string type{"application/json"};
     std::map<std::string, std::string> query{}, headers{};
     std::vector<api::Role> roles{api::Role::admin};
+    std::string token{"tester"};
   };
   api::Response call(api::Method method, const std::string& path, const std::string& body,
                      const Call& options) {
@@ -89,7 +90,7 @@ class AppFixture : public ::testing::Test {
     request.headers = options.headers;
     if (!body.empty() && !options.type.empty()) request.headers["content-type"] = options.type;
     request.body = body;
-    request.principal = {"tester", "tester", options.roles};
+    request.principal = {options.token, options.token, options.roles};
     request.request_id = "test-1";
     request.remote = "127.0.0.1";
     return app_->router().handle(request);

@@ -131,6 +131,42 @@ TEST_F(Places, AreReadByReadersAndWrittenByIntegratorsAndAdmins) {
   EXPECT_EQ(call(Method::get, f, "", as(Role::gateway)).status, 403);
 }
 
+/// The worker's work with something that happens meanwhile.
+class BusyPlaces : public Places {
+ protected:
+  void configure(api::Application::Deps& deps) override {
+    deps.run_plan_work = [this](const std::string& message, const api::WorkProgressSink& progress,
+                                const std::function<bool()>& canceled) {
+      if (auto meanwhile = std::exchange(meanwhile_, nullptr)) meanwhile();
+      return api::plan_work_inline(message, progress, canceled);
+    };
+  }
+  api::Response put_as(const std::string& token, const std::string& floor) {
+    auto options = as(Role::integrator, {{"if-match", header(get(floor), "ETag")}}, "image/png");
+    options.token = token;
+    return call(Method::put, floor + "/plan", room(), options);
+  }
+  std::function<void()> meanwhile_;
+};
+
+TEST_F(BusyPlaces, ReadAPlanOfEachOfTwoTokensAtOnceAndRefuseMoreWithWhatToDo) {
+  const auto mine = floor(), others = floor(), third = floor();
+  meanwhile_ = [&] {
+    const auto again = put_as("one", mine);
+    EXPECT_EQ(again.status, 429) << again.body;
+    EXPECT_EQ(header(again, "Retry-After"), "1");
+    EXPECT_NE(again.body.find("another plan of this token is being read"), std::string::npos) << again.body;
+    meanwhile_ = [&] {
+      const auto full = put_as("three", third);
+      EXPECT_EQ(full.status, 503) << full.body;
+      EXPECT_EQ(header(full, "Retry-After"), "1");
+    };
+    EXPECT_EQ(put_as("two", others).status, 201) << "not kept waiting by another's picture";
+  };
+  EXPECT_EQ(put_as("one", mine).status, 201);
+  EXPECT_EQ(put_as("three", third).status, 201) << "every place is given back";
+}
+
 TEST_F(Places, TakeAPlanAndGiveItBackByteForByte) {
   const auto f = floor();
   const auto file = room();

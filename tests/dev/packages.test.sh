@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# .ci/packages lists what is used and nothing else; @runtime is what the executable needs.
+# .ci/packages lists what is used and nothing else; @runtime is what the executable needs, @recommended what it runs and can do without.
 set -uo pipefail
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/../.." && pwd)
 cd "$root" || exit 1
@@ -58,5 +58,46 @@ if [[ -x ${ANCHORD_BINARY:-} ]] && command -v readelf >/dev/null; then
   grep -q '@runtime' .ci/Dockerfile ; pass_or_fail $? ".ci/Dockerfile does not install @runtime"
 else
   echo "@runtime was not compared: no ANCHORD_BINARY or no readelf"
+fi
+
+# --- @recommended: programs that the worker runs by name, and nothing else; the error says which package is missing.
+sources=(api core drivers server)
+run=$(grep -rhoE --include='*.cpp' '\brun\(\{"[^"/]+"' "${sources[@]}" | sed 's/.*"\(.*\)"/\1/' | sort -u)
+[[ -n $run ]] ; pass_or_fail $? "no program is found that the worker runs: this test looks for run({\"NAME\""
+programs=()
+for package in $(listed @recommended); do
+  files=$(dpkg -L "$package" 2>/dev/null | grep '^/usr/bin/') || { echo "$package was not compared: it is not installed"; continue; }
+  own_programs=$(grep -xFf <(sed 's|^|/usr/bin/|' <<<"$run") <<<"$files")
+  [[ -n $own_programs ]] ; pass_or_fail $? "the worker runs no program of $package: take it out of @recommended"
+  mapfile -t -O ${#programs[@]} programs <<<"$own_programs"
+  grep -rqF --include='*.cpp' "install $package" "${sources[@]}" ; pass_or_fail $? "no error says: install $package"
+done
+for program in $run; do
+  package=$(dpkg -S "/usr/bin/$program" 2>/dev/null | cut -d: -f1)
+  [[ -z $package ]] || grep -qx "$package" <(listed @recommended)
+  pass_or_fail $? "the worker runs $program of $package, which is not @recommended"
+done
+
+# A server to which its programs are not there: what else it does goes on, and what needs them says what to install.
+if [[ -x ${ANCHORD_BINARY:-} && ${#programs[@]} -gt 0 ]] && unshare --mount true 2>/dev/null; then
+  data=$(mktemp -d)
+  unshare --mount --propagation private bash -c 'for program in "${@:3}"; do mount --bind /dev/null "$program" || exit 1; done
+    exec "$1" serve --listen 127.0.0.1:0 --auth=off --data-dir "$2"' _ "$ANCHORD_BINARY" "$data" "${programs[@]}" >"$data/log" 2>&1 &
+  server=$!
+  trap 'kill "$server" 2>/dev/null; wait "$server"; rm -rf "$data"' EXIT
+  url=
+  for ((i = 0; i < 600 && ${#url} == 0; i++)); do
+    url=$(grep -oE 'http://127\.0\.0\.1:[1-9][0-9]*' "$data/log" | head -n 1)
+    sleep 0.1
+  done
+  api() { curl -sS -H 'Content-Type: application/json' "$@"; }
+  site=$(api "$url/api/v1/sites" -d '{"name":"S","origin":{"lon":3.7,"lat":51,"h_m":50}}' | jq -r .id)
+  building=$(api "$url/api/v1/buildings" -d '{"name":"B","site":"'"$site"'"}' | jq -r .id)
+  floor=$(api "$url/api/v1/floors" -d '{"name":"F","level":0,"building":"'"$building"'"}' | jq -r .id)
+  answer=$(curl -sS -X PUT -H 'If-Match: "f-1"' -H 'Content-Type: application/pdf' --data-binary '%PDF-1.7' "$url/api/v1/floors/$floor/plan")
+  [[ $(jq -r .status <<<"$answer") == 415 && $answer == *"install poppler-utils"* ]]
+  pass_or_fail $? "without poppler-utils a PDF is not 415 with what to install" "$answer"
+else
+  echo "a server without what is recommended was not tried: no ANCHORD_BINARY, no programs, or no mount namespace"
 fi
 verdict

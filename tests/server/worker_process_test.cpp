@@ -167,9 +167,31 @@ std::string two_pages(int inches) {
                  "<</Length 29>>stream\n0 0 0 rg 100 100 300 8 re f  \nendstream",
                  "<</Type/Page/Parent 2 0 R/MediaBox[0 0 " + size + " 72]/Rotate 90/Contents 4 0 R>>"});
 }
-std::string page_message(const std::string& pdf, int page, int dpi = 100) {
+std::string page_message(const std::string& pdf, int page, int dpi = 100, int cpu_s = 30) {
   return R"(floor_plan page {"task":"page","enu_from_pixel":[1,0,0,0,-1,0],"page":)" + std::to_string(page) +
-         R"(,"dots_per_inch":)" + std::to_string(dpi) + "}\n" + pdf;
+         R"(,"dots_per_inch":)" + std::to_string(dpi) + R"(,"cpu_s":)" + std::to_string(cpu_s) + "}\n" + pdf;
+}
+/// A page that draws a form ten times, which draws another ten times, and so on: 10^12 lines in 3 kB.
+std::string form_bomb() {
+  constexpr int k_depth = 12;
+  const auto stream = [](const std::string& keys, const std::string& text) {
+    return "<<" + keys + "/Length " + std::to_string(text.size()) + ">>stream\n" + text + "\nendstream";
+  };
+  const auto draws = [](int object) {
+    return "/Resources<</XObject<</F " + std::to_string(object) + " 0 R>>>>";
+  };
+  std::vector<std::string> objects{
+      "<</Type/Catalog/Pages 2 0 R>>", "<</Type/Pages/Kids[3 0 R]/Count 1>>",
+      "<</Type/Page/Parent 2 0 R/MediaBox[0 0 842 595]/Contents 4 0 R" + draws(5) + ">>",
+      stream("", "/F Do")};
+  for (int level = 0; level < k_depth; ++level) {
+    const bool last = level + 1 == k_depth;
+    std::string text;
+    for (int i = 0; i < 10; ++i) text += last ? "0 0 m 800 500 l S " : "/F Do ";
+    objects.push_back(stream(
+        "/Type/XObject/Subtype/Form/BBox[0 0 842 595]" + (last ? std::string() : draws(6 + level)), text));
+  }
+  return pdf_of(objects);
 }
 
 TEST_F(WorkerProcess, DrawsAPageOfAPdfByPopplerAndRefusesWhatIsNone) {
@@ -242,6 +264,27 @@ TEST_F(WorkerProcess, HostilePdfsAreRefusedOrDrawnWithoutWhatTheyAskFor) {
     EXPECT_EQ(std::ranges::count(image.pixels, 255), std::ranges::ssize(image.pixels))
         << what << ": not blank";
   }
+}
+
+TEST_F(WorkerProcess, APageThatWouldBeDrawnForeverEndsWithItsProcessorTimeAndSaysWhatToDo) {
+  const std::string real = "exec '" ANCHORD_BINARY "' worker";
+  const auto bomb = run(real, page_message(form_bomb(), 1, 100, 1));
+  ASSERT_FALSE(bomb);
+  EXPECT_EQ(bomb.error().code, Errc::no_convergence) << bomb.error().message;
+  EXPECT_NE(bomb.error().message.find("pdftoppm used up 1 s of processor time"), std::string::npos)
+      << bomb.error().message;
+  EXPECT_NE(bomb.error().message.find("export the page as PNG"), std::string::npos) << bomb.error().message;
+}
+
+TEST_F(WorkerProcess, ADecoderThatWorksOnAndOnIsEndedByItsProcessorTimeAndNotCalledOutOfMemory) {
+  const std::string real = "exec '" ANCHORD_BINARY "' worker";
+  std::string message = plan_message(floor_plan::jpeg_of_scans(9'600, 480));
+  message.insert(message.find("\"enu"), R"("cpu_s":1,)");
+  const auto bomb = run(real, message);
+  ASSERT_FALSE(bomb);
+  EXPECT_EQ(bomb.error().code, Errc::no_convergence) << bomb.error().message;
+  EXPECT_NE(bomb.error().message.find("more than 1 s of processor time"), std::string::npos)
+      << bomb.error().message;
 }
 
 TEST_F(WorkerProcess, APageWithoutItsMarkRunsNoProgram) {

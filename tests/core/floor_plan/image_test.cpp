@@ -119,6 +119,16 @@ TEST(PlanImage, OfAnotherKindIsRefusedWithWhatIsAccepted) {
   }
 }
 
+TEST(PlanImage, OfAJpegWithMoreScansThanAnyProgramWritesIsRefused) {
+  const auto plain = decode_image(bytes(jpeg_of_scans(800, 9)));
+  ASSERT_TRUE(plain.has_value()) << plain.error().message;
+  EXPECT_EQ(plain.value().pixels.at(0), 128) << "the middle grey that zero stands for";
+  const auto bomb = decode_image(bytes(jpeg_of_scans(800, 600)));
+  ASSERT_FALSE(bomb.has_value());
+  EXPECT_EQ(bomb.error().code, Errc::bad_frame);
+  EXPECT_NE(bomb.error().message.find("more than 500 scans"), std::string::npos) << bomb.error().message;
+}
+
 TEST(PlanImage, CutShortAnywhereIsAnErrorAndNeverHalfAPicture) {
   const auto image = picture(40, 30);
   for (const auto& whole : {encode_png(image).value(), jpeg_of(image), tiff(false, false)}) {

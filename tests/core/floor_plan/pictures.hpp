@@ -54,6 +54,25 @@ inline std::string tiff(bool big_endian, bool point, int code_key = 3072, int co
          data;
 }
 
+/// A progressive grey JPEG of so many pixels a side (ITU T.81), every coefficient zero: one scan of DC values
+/// with a bit for each block, and scans of the others in runs of 16384 blocks, each a pass over the picture.
+inline std::string jpeg_of_scans(std::uint32_t side, int ac_scans) {
+  const auto segment = [](int marker, const std::string& body) {
+    return std::string("\xff") + static_cast<char>(marker) + big(body.size() + 2, 2) + body;
+  };
+  const auto code_table = [&](char which, char symbol) {  // one code, of one bit
+    return segment(0xc4, std::string(1, which) + '\1' + std::string(15, '\0') + symbol);
+  };
+  const std::size_t blocks = std::size_t{side / 8} * (side / 8), runs = (blocks + 16383) / 16384;
+  std::string out = "\xff\xd8" + segment(0xdb, '\0' + std::string(64, '\1'));
+  out += segment(0xc2, '\x08' + big(side, 2) + big(side, 2) + std::string("\1\1\x11\0", 4));
+  out += code_table('\0', '\0') + code_table('\x10', '\xe0');
+  out += segment(0xda, std::string("\1\1\0\0\0\0", 6)) + std::string((blocks + 7) / 8, '\0');
+  const auto scan = segment(0xda, std::string("\1\1\0\1\x3f\0", 6)) + std::string((15 * runs + 7) / 8, '\0');
+  while (ac_scans-- > 0) out += scan;
+  return out + "\xff\xd9";
+}
+
 /// The head of a PNG of this size, and nothing behind it.
 inline std::string png_head(std::uint32_t width, std::uint32_t height) {
   return std::string("\x89PNG\r\n\x1a\n", 8) + big(13, 4) + "IHDR" + big(width, 4) + big(height, 4) +
