@@ -163,7 +163,7 @@ ModelAnswer ModelRegistry::predict(const Active& active, const nlos::FeatureVect
 
 std::optional<RangeModel> predict_range(const ModelRegistry::Active& active, const Range& range) {
   if (active.predictor.empty() || range.kind != RangeKind::tag_anchor) return std::nullopt;
-  const auto verdict = active.predictor.predict(features_of(range), active.correction);
+  const auto verdict = active.predictor.predict(features_of(range, false), active.correction);
   if (!verdict.p_los && !verdict.bias_m) return std::nullopt;
   return RangeModel{verdict.los,
                     verdict.p_los,

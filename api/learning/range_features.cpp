@@ -6,9 +6,10 @@
 namespace anchord::api {
 namespace {
 
-void take_cir(const std::optional<Cir>& cir, nlos::DiagnosticSample& s) {
+void take_cir(const std::optional<Cir>& cir, bool whole_record, nlos::DiagnosticSample& s) {
   if (!cir) return;
   nlos::CirOptions options;
+  options.whole_record = whole_record;
   if (cir->dt_ps > 0) options.tap_ns = cir->dt_ps * 1e-3;
   // STD_NOISE is of |h|, whose variance in noise (Rayleigh) is 1 - pi / 4 of its mean square.
   if (s.std_noise) options.noise_rms = *s.std_noise / std::sqrt(1 - std::numbers::pi / 4);
@@ -19,14 +20,14 @@ void take_cir(const std::optional<Cir>& cir, nlos::DiagnosticSample& s) {
 
 }  // namespace
 
-nlos::FeatureVector features_of(const Range& range) {
+nlos::FeatureVector features_of(const Range& range, bool whole_record) {
   nlos::DiagnosticSample s;
   s.range_m = range.distance_m;
   s.rx_dbm = range.rx_dbm ? range.rx_dbm : range.rss_dbm;
   s.fp_dbm = range.fp_dbm;
   s.std_noise = range.std_noise;
   // Its heading is a compass's; a campaign's heading_deg is the orientation a person noted (5.2).
-  take_cir(range.cir, s);
+  take_cir(range.cir, whole_record, s);
   return nlos::compute_features(s);
 }
 
@@ -45,7 +46,7 @@ nlos::FeatureVector features_of(const CampaignSample& x, const GroundTruth& trut
   s.fp_index = x.fp_index;
   s.heading_deg = truth.heading_deg;
   s.height_difference_m = truth.height_difference_m;
-  take_cir(x.cir, s);
+  take_cir(x.cir, true, s);
   return nlos::compute_features(s);
 }
 

@@ -91,37 +91,69 @@ TagTrack::TagTrack(std::span<const Fix> fixes, const std::optional<EnuFrame>& fr
   has_attitude_ = !poses_.empty() &&
                   std::ranges::all_of(poses_, [](const TrackPose& p) { return p.attitude.has_value(); });
   missed_ = InterpolationError(good_enough(poses_, min_fix_));
+  index();
+}
+
+void TagTrack::index() {
+  const std::size_t n = poses_.size();
+  for (const TrackPose& pose : poses_) times_s_.push_back(pose.t_s);
+  missed_midway_m_.assign(n, 0.0);
+  for (std::size_t i = 1; i < n; ++i)
+    missed_midway_m_[i] = missed_.sigma_m(times_s_[i] - times_s_[i - 1], 0.5);
+  if (n < 2) return;
+  const double span_s = (times_s_.back() - times_s_.front()) / static_cast<double>(n);
+  spans_per_s_ = 1.0 / span_s;
+  spans_.resize(n + 1);
+  std::uint32_t pose = 0;
+  for (std::size_t i = 0; i <= n; ++i) {
+    while (pose < n && span_of(times_s_[pose]) < i) ++pose;
+    spans_[i] = pose;
+  }
+}
+
+std::size_t TagTrack::span_of(double t_s) const {
+  return std::min(static_cast<std::size_t>((t_s - times_s_.front()) * spans_per_s_), poses_.size() - 1);
+}
+
+std::size_t TagTrack::after(double t_s) const {
+  if (poses_.empty() || t_s < times_s_.front()) return 0;
+  if (!(t_s < times_s_.back())) return poses_.size();
+  const std::size_t span = span_of(t_s);
+  const auto at = [this](std::size_t pose) { return times_s_.begin() + static_cast<std::ptrdiff_t>(pose); };
+  const auto found = std::upper_bound(at(spans_[span]), at(spans_[span + 1]), t_s);
+  return static_cast<std::size_t>(found - times_s_.begin());
 }
 
 TagPoint TagTrack::at(double t_s, const Eigen::Vector3d& lever_arm_body_m) const {
   TagPoint point;
-  const auto after = std::ranges::upper_bound(poses_, t_s, {}, &TrackPose::t_s);
-  if (after == poses_.begin()) {
+  const std::size_t next = after(t_s);
+  if (next == 0) {
     point.refused = TrackRefusal::outside;
     return point;
   }
-  const auto before = std::prev(after);
-  if (after == poses_.end()) {
+  const TrackPose& before = poses_[next - 1];
+  if (next == poses_.size()) {
     point.refused = TrackRefusal::outside;
     // The last epoch itself is not an extrapolation.
-    if (before->t_s < t_s) return point;
-    if (before->fix < min_fix_) {
+    if (before.t_s < t_s) return point;
+    if (before.fix < min_fix_) {
       point.refused = TrackRefusal::fix_class;
       return point;
     }
-    return interpolate(*before, *before, t_s, lever_arm_body_m);
+    return interpolate(before, before, t_s, lever_arm_body_m);
   }
-  const double interval_s = after->t_s - before->t_s;
-  const double missed_m = missed_.sigma_m(interval_s, (t_s - before->t_s) / interval_s);
+  const TrackPose& later = poses_[next];
+  const double interval_s = later.t_s - before.t_s, share = (t_s - before.t_s) / interval_s;
+  const double missed_m = 4.0 * share * (1.0 - share) * missed_midway_m_[next];
   if (max_gap_s_ ? interval_s > *max_gap_s_ : missed_m > k_most_missed_m) {
     point.refused = TrackRefusal::gap;
     return point;
   }
-  if (before->fix < min_fix_ || after->fix < min_fix_) {
+  if (before.fix < min_fix_ || later.fix < min_fix_) {
     point.refused = TrackRefusal::fix_class;
     return point;
   }
-  point = interpolate(*before, *after, t_s, lever_arm_body_m);
+  point = interpolate(before, later, t_s, lever_arm_body_m);
   point.covariance_m2.diagonal().array() += missed_m * missed_m;
   return point;
 }

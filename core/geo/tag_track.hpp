@@ -74,7 +74,18 @@ class TagTrack {
   const InterpolationError& interpolation_error() const { return missed_; }
 
  private:
+  void index();
+  std::size_t span_of(double t_s) const;  ///< t_s no earlier than the first pose
+  /// First pose later than t_s.
+  std::size_t after(double t_s) const;
+
   std::vector<TrackPose> poses_;  ///< ascending in time, no two at one instant
+  std::vector<double> times_s_;   ///< of the poses, side by side to be searched
+  /// As many spans of equal length as poses: first pose later than the begin of each, so that a search looks
+  /// at one or two, as a rule, whatever the length of the flight.
+  std::vector<std::uint32_t> spans_;
+  double spans_per_s_{0};
+  std::vector<double> missed_midway_m_;  ///< between the pose before and this
   FixClass min_fix_;
   std::optional<double> max_gap_s_;
   InterpolationError missed_{std::span<const TrackPose>{}};

@@ -25,7 +25,7 @@ struct Work {
   FlightRows rows;
   FlightOptions options{};  ///< in the frame of the rows
   JointFit fit{};
-  std::vector<StartSearch> searches{};
+  JointStart start{};  ///< by `prior`, of which it asks the mean alone
   SharedPrior prior{};
   ProfileFactor factor{};
   ProfileFactor alone{};  ///< what the flight said before it was told anything
@@ -78,10 +78,10 @@ bool shows_antennas_apart(const Work& work) {
 
 Result<void> solve_with(Work& work, const SharedPrior& prior) {
   const FlightOptions& options = work.options;
+  if (work.start.searches.empty() || work.prior.mean != prior.mean)
+    work.start = joint_start(work.rows, prior, options);
   work.prior = prior;
-  JointStart start = joint_start(work.rows, prior, options);
-  work.searches = std::move(start.searches);
-  BOOST_OUTCOME_TRY(work.fit, solve_joint(work.rows, start.state, prior, options));
+  BOOST_OUTCOME_TRY(work.fit, solve_joint(work.rows, work.start.state, prior, options));
   work.factor = profile_factor(work.fit, prior, work.name);
   work.factor.digest = work.digest;
   return boost::outcome_v2::success();
@@ -157,7 +157,14 @@ std::size_t n_believed(const FlightRows& flight) {
   return n;
 }
 
-FlightSolution describe(const Work& work, const FlightData& flight) {
+/// Lets go of the anchor's rows: what is said of each range takes their place in memory.
+AnchorSolution assessed(Work& work, std::size_t index) {
+  AnchorSolution anchor = assess_anchor(work.rows, work.fit, index, work.options);
+  work.rows.anchors[index].rows = {};
+  return anchor;
+}
+
+FlightSolution describe(Work& work, const FlightData& flight) {
   const FlightOptions& options = work.options;
   FlightSolution solution;
   solution.mission = flight.mission.id;
@@ -215,14 +222,14 @@ FlightSolution describe(const Work& work, const FlightData& flight) {
   }
   auto budgets = error_budgets(work.rows, work.fit, work.prior, options);
   for (std::size_t i = 0; i < work.rows.anchors.size(); ++i) {
-    AnchorSolution anchor = assess_anchor(work.rows, work.fit, i, options);
+    AnchorSolution anchor = assessed(work, i);
     if (anchor.estimate.best) {
       auto& gates = anchor.estimate.gates;
       gates.insert(gates.end(), work.checks.begin(), work.checks.end());
       if (!work.unseen_arm.empty()) gates.push_back(work.unseen_arm[i]);
       anchor.budget = std::move(budgets[i]);
     }
-    anchor.search = work.searches[i];
+    anchor.search = std::move(work.start.searches[i]);
     anchor.estimate.bias_m = solution.shared.bias_m.value + anchor.delay_m.value_or(0.0);
     anchor.estimate.bias_sigma_m =
         std::hypot(solution.shared.bias_m.sigma, anchor.delay_sigma_m.value_or(options.delay_prior_m));

@@ -33,7 +33,9 @@ double duration_s(const std::vector<double>& times_s) {
 class Neighbours {
  public:
   void add(const JointRow& row, double residual_m) {
-    auto& last = last_[{row.tag, row.antenna}];
+    const std::pair antenna{row.tag, row.antenna};
+    if (!newest_ || newest_->first != antenna) newest_ = &*last_.try_emplace(antenna).first;
+    auto& last = newest_->second;
     if (last && row.t_s - last->first <= 0.5) jumps_m_.push_back(std::abs(residual_m - last->second));
     last = {row.t_s, residual_m};
   }
@@ -44,7 +46,9 @@ class Neighbours {
   }
 
  private:
-  std::map<std::pair<NetworkId, std::uint8_t>, std::optional<std::pair<double, double>>> last_;
+  using Last = std::map<std::pair<NetworkId, std::uint8_t>, std::optional<std::pair<double, double>>>;
+  Last last_;
+  Last::value_type* newest_{nullptr};  ///< most ranges are of the antenna of the one before
   std::vector<double> jumps_m_;
 };
 
@@ -86,18 +90,103 @@ struct AnchorTask {
   bool claims{};            ///< information as it is claimed in the end, not as the search needs it
 };
 
-void add_lines(const std::vector<JointLine>& lines, const std::vector<double>& weights, double unit,
-               AnchorBlock& block, JointNormal& normal) {
+/// Weighted sums of products of what the lines of one antenna hold. The derivatives by bias and delay are 1,
+/// and an antenna's own arm is seen as the common one is: each product is summed once, over four lines at a
+/// time, in the same order whatever registers a machine has.
+class LineSums {
+ public:
+  void add(const JointLine& line, double weight) {
+    const SharedVector& s = line.by_shared;
+    const std::array<double, k_columns> values{
+        line.by_anchor[0], line.by_anchor[1], line.by_anchor[2], 1.0,
+        s[k_shared_curve], s[k_shared_lag],   s[k_shared_lever], s[k_shared_forward],
+        s[k_shared_left],  line.residual_m};
+    for (std::size_t i = 0; i < k_columns; ++i) columns_[i][n_] = values[i];
+    weight_[n_] = weight;
+    if (++n_ == k_lanes) sum();
+  }
+  /// Into the blocks; arm: of the antenna, if it has one of its own.
+  void add_to(std::optional<int> arm, AnchorBlock& block, JointNormal& normal) {
+    sum();
+    const Eigen::Matrix<double, k_columns, k_columns> all = totals();
+    constexpr std::array own{0, 1, 2, 3};
+    constexpr int residual = k_columns - 1;
+    // Column of the sums that each shared unknown has.
+    std::array<int, k_shared_size> column{3, 4, 5, 6, 7, 8, -1, -1, -1, -1};
+    if (arm) column[static_cast<std::size_t>(k_shared_antennas + *arm)] = 6;
+    block.own += all.topLeftCorner<4, 4>();
+    block.gradient += all.block<4, 1>(0, residual);
+    for (int j = 0; j < k_shared_size; ++j) {
+      const int cj = column[static_cast<std::size_t>(j)];
+      if (cj < 0) continue;
+      for (const int i : own) block.shared(i, j) += all(i, cj);
+      normal.shared_gradient[j] += all(cj, residual);
+      for (int i = 0; i < k_shared_size; ++i) {
+        const int ci = column[static_cast<std::size_t>(i)];
+        if (ci >= 0) normal.shared(i, j) += all(ci, cj);
+      }
+    }
+  }
+
+ private:
+  static constexpr std::size_t k_lanes = 4, k_columns = 10, k_products = k_columns * (k_columns + 1) / 2;
+  using Four = double __attribute__((vector_size(k_lanes * sizeof(double))));
+
+  /// The lines gathered; where they are fewer than four the rest weighs nothing.
+  void sum() {
+    for (; n_ > 0 && n_ < k_lanes; ++n_) weight_[n_] = 0;
+    if (n_ > 0) (k_avx2 ? add_products_avx2 : add_products)(*this);
+    n_ = 0;
+  }
+  __attribute__((always_inline)) static inline void add_all_products(LineSums& of) {
+    const Four* columns = of.columns_.data();
+    Four* product = of.sums_.data();
+    for (std::size_t i = 0; i < k_columns; ++i) {
+      const Four weighed = of.weight_ * columns[i];
+      for (std::size_t j = i; j < k_columns; ++j) *product++ += weighed * columns[j];
+    }
+  }
+  static void add_products(LineSums& of) { add_all_products(of); }
+#if defined(__x86_64__)
+  __attribute__((target("avx2"))) static void add_products_avx2(LineSums& of) { add_all_products(of); }
+  inline static const bool k_avx2 = __builtin_cpu_supports("avx2") != 0;
+#else
+  static constexpr bool k_avx2 = false;
+  static constexpr auto add_products_avx2 = add_products;
+#endif
+  Eigen::Matrix<double, k_columns, k_columns> totals() const {
+    Eigen::Matrix<double, k_columns, k_columns> out;
+    std::size_t product = 0;
+    for (int i = 0; i < static_cast<int>(k_columns); ++i)
+      for (int j = i; j < static_cast<int>(k_columns); ++j) {
+        const Four& s = sums_[product++];
+        out(i, j) = out(j, i) = (s[0] + s[1]) + (s[2] + s[3]);
+      }
+    return out;
+  }
+
+  // As a template's argument Four loses the alignment that its loads rely on.
+  alignas(k_lanes * sizeof(double)) std::array<Four, k_columns> columns_{};
+  Four weight_{};
+  std::size_t n_{0};
+  alignas(k_lanes * sizeof(double)) std::array<Four, k_products> sums_{};
+};
+
+static_assert(alignof(LineSums) == 32, "AVX2 reads its columns in place");
+
+/// Antennas with arms of their own each by themselves, and all others together.
+void add_lines(const std::vector<JointLine>& lines, const std::vector<double>& weights,
+               const std::vector<const JointRow*>& rows, double unit, AnchorBlock& block,
+               JointNormal& normal) {
+  std::vector<LineSums> sums(1);
   for (std::size_t i = 0; i < lines.size(); ++i) {
     if (weights[i] <= 0) continue;
-    const double weight = weights[i] * unit;
-    const JointLine& line = lines[i];
-    block.own.noalias() += weight * line.by_anchor * line.by_anchor.transpose();
-    block.shared.noalias() += weight * line.by_anchor * line.by_shared.transpose();
-    block.gradient += weight * line.residual_m * line.by_anchor;
-    normal.shared.noalias() += weight * line.by_shared * line.by_shared.transpose();
-    normal.shared_gradient += weight * line.residual_m * line.by_shared;
+    const std::size_t arm = rows[i]->arm ? static_cast<std::size_t>(*rows[i]->arm) + 1 : 0;
+    if (arm >= sums.size()) sums.resize(arm + 1);
+    sums[arm].add(lines[i], weights[i] * unit);
   }
+  for (std::size_t arm = 0; arm < sums.size(); ++arm)
+    sums[arm].add_to(arm > 0 ? std::optional{static_cast<int>(arm) - 1} : std::nullopt, block, normal);
 }
 
 /// Scatter of the ranges kept. Jumps to those that are off by metres, and the scale they blow up, are no
@@ -183,7 +272,7 @@ void build_anchor(const AnchorTask& task, AnchorBlock& block, JointNormal& norma
   const double slow_share =
       k_least_slow_m * k_least_slow_m / kept_variance_m2(kept_sizes, block.scale_m, options.min_scale_m);
   block.kappa = 1.0 + (alike - 1.0) * std::clamp(slow_share, 1.0 - k_believed_white * block.white_share, 1.0);
-  add_lines(lines, weights, 1.0 / (block.kappa * scale2), block, normal);
+  add_lines(lines, weights, placed, 1.0 / (block.kappa * scale2), block, normal);
 }
 
 }  // namespace

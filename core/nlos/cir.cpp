@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 
 namespace anchord::nlos {
 namespace {
@@ -9,34 +10,125 @@ namespace {
 /// PRF 16 MHz has 992 taps, 64 MHz 1016.
 constexpr std::size_t k_whole_record = 992;
 
+constexpr std::size_t k_lanes = 4;
+/// Four doubles and the arithmetic of one: two SSE2 registers or one of AVX2, the same operations in either.
+using Four = double __attribute__((vector_size(32)));
+using FourFloats = float __attribute__((vector_size(16)));
+using FourInts = std::int32_t __attribute__((vector_size(16)));
+using FourWords = std::uint32_t __attribute__((vector_size(16)));
+using EightInts = std::int32_t __attribute__((vector_size(32)));
+using EightWords = std::uint32_t __attribute__((vector_size(32)));
+using FourLongs = std::uint64_t __attribute__((vector_size(32)));
+#define ANCHORD_INLINE inline __attribute__((always_inline))
+
+ANCHORD_INLINE Four four(double value) { return Four{value, value, value, value}; }
+ANCHORD_INLINE double sum(Four a) { return (a[0] + a[1]) + (a[2] + a[3]); }
+
+/// |h|^2 of integer parts re and im. Which half of a 32-bit word is which makes no odds: both are squared.
+template <class Ints, class Words>
+ANCHORD_INLINE Words squares(Words words) {
+  const auto one = reinterpret_cast<Words>(reinterpret_cast<Ints>(words) >> 16);
+  const auto other = reinterpret_cast<Words>(reinterpret_cast<Ints>(words << 16U) >> 16);
+  return one * one + other * other;
+}
+
 struct Complex {
   const std::int16_t* re_im;
+
   double power(std::size_t k) const {
     const double re = re_im[2 * k];
     const double im = re_im[2 * k + 1];
     return re * re + im * im;
   }
+  /// Of the group of taps from k on, 0 from `count` on.
+  ANCHORD_INLINE Four powers(std::size_t k, std::size_t count) const {
+    FourWords words{};
+    std::memcpy(&words, re_im + 2 * k, count * sizeof(std::uint32_t));
+    const auto power = reinterpret_cast<FourInts>(squares<FourInts>(words));
+    // 2^31, of twice -32768, is the one power that a signed word takes for a negative one.
+    const Four out = __builtin_convertvector(power, Four);
+    return out < 0.0 ? -out : out;
+  }
+  ANCHORD_INLINE Four magnitudes(Four powers, std::size_t, std::size_t) const {
+    Four out;
+    for (std::size_t i = 0; i < k_lanes; ++i) out[i] = __builtin_sqrt(powers[i]);
+    return out;
+  }
+  /// In integers: eight taps at a time, and exact.
+  ANCHORD_INLINE double energy(std::size_t begin, std::size_t end) const {
+    FourLongs even{}, odd{};
+    std::size_t k = begin;
+    for (; k + 2 * k_lanes <= end; k += 2 * k_lanes) {
+      EightWords words;
+      std::memcpy(&words, re_im + 2 * k, sizeof words);
+      const auto pairs = reinterpret_cast<FourLongs>(squares<EightInts>(words));
+      even += pairs & 0xffffffffU;
+      odd += pairs >> 32U;
+    }
+    even += odd;
+    auto out = static_cast<double>((even[0] + even[1]) + (even[2] + even[3]));
+    for (; k < end; ++k) out += power(k);
+    return out;
+  }
 };
 
 struct Magnitude {
   const float* m;
+
   double power(std::size_t k) const { return static_cast<double>(m[k]) * static_cast<double>(m[k]); }
+  ANCHORD_INLINE Four magnitudes(Four, std::size_t k, std::size_t count) const {
+    FourFloats taps{};
+    std::memcpy(&taps, m + k, count * sizeof(float));
+    const Four out = __builtin_convertvector(taps, Four);
+    return out < 0.0 ? -out : out;
+  }
+  ANCHORD_INLINE Four powers(std::size_t k, std::size_t count) const {
+    const Four magnitude = magnitudes(Four{}, k, count);
+    return magnitude * magnitude;
+  }
+  ANCHORD_INLINE double energy(std::size_t begin, std::size_t end) const {
+    Four out{};
+    std::size_t k = begin;
+    for (; k + k_lanes <= end; k += k_lanes) out += powers(k, k_lanes);
+    return sum(out + powers(k, end - k));
+  }
 };
 
-// Four independent sums, so that the additions do not wait for each other.
-template <class Taps>
-double mean_power(const Taps& taps, std::size_t begin, std::size_t end) {
-  double s0 = 0, s1 = 0, s2 = 0, s3 = 0;
-  std::size_t k = begin;
-  for (; k + 4 <= end; k += 4) {
-    s0 += taps.power(k);
-    s1 += taps.power(k + 1);
-    s2 += taps.power(k + 2);
-    s3 += taps.power(k + 3);
+/// Taps of a group that begins at k.
+ANCHORD_INLINE Four numbers(std::size_t k) { return static_cast<double>(k) + Four{0, 1, 2, 3}; }
+
+/// Raw moments of |h|: kurtosis is eq 5.3.
+struct Moments {
+  Four m1{}, m2{}, m3{}, m4{};
+  ANCHORD_INLINE void add(Four power, Four magnitude) {
+    m1 += magnitude;
+    m2 += power;
+    m3 += power * magnitude;
+    m4 += power * power;
   }
-  for (; k < end; ++k) s0 += taps.power(k);
-  return (s0 + s1 + s2 + s3) / static_cast<double>(end - begin);
-}
+  ANCHORD_INLINE double kurtosis(double count) const {
+    const double mean2 = sum(m2) / count, mu = sum(m1) / count, var = mean2 - mu * mu;
+    const double mu4 =
+        sum(m4) / count - 4 * mu * sum(m3) / count + 6 * mu * mu * mean2 - 3 * mu * mu * mu * mu;
+    return var > 1e-12 * mean2 ? mu4 / (var * var) : 0.0;
+  }
+};
+
+/// Of a power q at taps t from the first path.
+struct Delays {
+  Four q{}, qt{}, qtt{};
+  ANCHORD_INLINE void add(Four power, Four t) {
+    const Four at = power * t;
+    q += power;
+    qt += at;
+    qtt += at * t;
+  }
+  ANCHORD_INLINE double energy() const { return sum(q); }
+  ANCHORD_INLINE double mean_taps() const { return sum(qt) / sum(q); }
+  ANCHORD_INLINE double rms_taps() const {
+    return std::sqrt(std::max(0.0, sum(qtt) / sum(q) - mean_taps() * mean_taps()));
+  }
+};
 
 // First tap above the threshold whose successor does not fall back under it, with the crossing interpolated.
 template <class Taps>
@@ -53,33 +145,62 @@ std::optional<double> find_first_path(const Taps& taps, std::size_t n, std::size
   return std::nullopt;
 }
 
-template <class Taps>
-WholeRecordShape whole_shape(const Taps& taps, std::size_t n, double first_path, double tap_ns) {
-  double m1 = 0, m2 = 0, m3 = 0, m4 = 0, sum_t = 0, sum_tt = 0;
-  for (std::size_t k = 0; k < n; ++k) {
-    const double power = taps.power(k), h = std::sqrt(power), t = static_cast<double>(k) - first_path;
-    m1 += h;
-    m2 += power;
-    m3 += power * h;
-    m4 += power * power;
-    sum_t += power * t;
-    sum_tt += power * t * t;
-  }
-  const auto count = static_cast<double>(n);
-  const double mu = m1 / count, var = m2 / count - mu * mu;
-  const double mu4 = m4 / count - 4 * mu * m3 / count + 6 * mu * mu * m2 / count - 3 * mu * mu * mu * mu;
-  const double mean_tap = sum_t / m2;
-  return {var > 1e-12 * (m2 / count) ? mu4 / (var * var) : 0.0, mean_tap * tap_ns,
-          std::sqrt(std::max(0.0, sum_tt / m2 - mean_tap * mean_tap)) * tap_ns};
+/// Every group of taps of a stretch; what is known of the length of a whole one makes it a single load.
+template <class Taps, class Sums>
+ANCHORD_INLINE void add_all(const Taps& taps, std::size_t begin, std::size_t end, Sums& sums) {
+  std::size_t k = begin;
+  for (; k + k_lanes <= end; k += k_lanes) sums.add(taps, k, k_lanes);
+  if (k < end) sums.add(taps, k, end - k);
 }
 
+struct Record {
+  double first_path{};
+  Moments moments{};
+  Delays delays{};
+
+  template <class Taps>
+  ANCHORD_INLINE void add(const Taps& taps, std::size_t k, std::size_t count) {
+    const Four power = taps.powers(k, count);
+    moments.add(power, taps.magnitudes(power, k, count));
+    delays.add(power, numbers(k) - first_path);
+  }
+};
+
+/// The taps of the window, q: power above the noise.
+struct Window {
+  double first_path{}, noise_power{}, keep_power{}, early_end{};
+  Moments moments{};
+  Delays above_noise{};
+  Four early{};
+  Four peak = four(-1), peak_tap{};
+
+  template <class Taps>
+  ANCHORD_INLINE void add(const Taps& taps, std::size_t k, std::size_t count) {
+    const Four power = taps.powers(k, count), tap = numbers(k);
+    moments.add(power, taps.magnitudes(power, k, count));
+    const Four q = power > keep_power ? power - noise_power : four(0);
+    above_noise.add(q, tap - first_path);
+    early += tap < early_end ? q : four(0);
+    peak_tap = power > peak ? tap : peak_tap;
+    peak = power > peak ? power : peak;
+  }
+  /// The first of the strongest.
+  ANCHORD_INLINE double strongest() const {
+    std::size_t best = 0;
+    for (std::size_t i = 1; i < k_lanes; ++i)
+      if (peak[i] > peak[best] || (peak[i] == peak[best] && peak_tap[i] < peak_tap[best])) best = i;
+    return peak_tap[best];
+  }
+};
+
 template <class Taps>
-std::optional<CirShape> shape_of(const Taps& taps, std::size_t n, std::optional<double> first_path_idx,
-                                 const CirOptions& o) {
+ANCHORD_INLINE std::optional<CirShape> shape_of(const Taps& taps, std::size_t n,
+                                                std::optional<double> first_path_idx, const CirOptions& o) {
   const bool has_noise = n > o.noise_end && o.noise_end > o.noise_begin;
-  const double noise_power = has_noise     ? mean_power(taps, o.noise_begin, o.noise_end)
-                             : o.noise_rms ? *o.noise_rms * *o.noise_rms
-                                           : 0.0;
+  const double noise_power =
+      has_noise ? taps.energy(o.noise_begin, o.noise_end) / static_cast<double>(o.noise_end - o.noise_begin)
+      : o.noise_rms ? *o.noise_rms * *o.noise_rms
+                    : 0.0;
   if (!first_path_idx) {
     if (!has_noise) return std::nullopt;
     first_path_idx =
@@ -92,62 +213,67 @@ std::optional<CirShape> shape_of(const Taps& taps, std::size_t n, std::optional<
   if (fp_tap < o.window_before || fp_tap + o.window_after >= n) return std::nullopt;
   const std::size_t begin = fp_tap - o.window_before, end = fp_tap + o.window_after + 1;
 
-  double sum_q = 0, sum_qt = 0, sum_qtt = 0,
-         early = 0;                       // q: power above the noise, t: taps from the first path
-  double m1 = 0, m2 = 0, m3 = 0, m4 = 0;  // raw moments of |h|
-  double peak = -1, peak_tap = 0, all = 0;
-  const double keep_power = o.keep_rms * o.keep_rms * noise_power;
-  for (std::size_t k = begin; k < end; ++k) {
-    const double power = taps.power(k);
-    const double h = std::sqrt(power);
-    m1 += h;
-    m2 += power;
-    m3 += power * h;
-    m4 += power * power;
-    all += power;
-    if (power > peak) {
-      peak = power;
-      peak_tap = static_cast<double>(k);
-    }
-    const double q = power > keep_power ? power - noise_power : 0.0;
-    const double t = static_cast<double>(k) - fp;
-    sum_q += q;
-    sum_qt += q * t;
-    sum_qtt += q * t * t;
-    if (k < begin + o.early_taps) early += q;
-  }
-  if (!(sum_q > 0)) return std::nullopt;
+  Window window{fp, noise_power, o.keep_rms * o.keep_rms * noise_power,
+                static_cast<double>(begin + o.early_taps)};
+  add_all(taps, begin, end, window);
+  const double above_noise = window.above_noise.energy();
+  if (!(above_noise > 0)) return std::nullopt;
 
-  const auto count = static_cast<double>(end - begin);
-  const double mu = m1 / count;
-  const double var = m2 / count - mu * mu;
-  const double mu4 = m4 / count - 4 * mu * m3 / count + 6 * mu * mu * m2 / count - 3 * mu * mu * mu * mu;
   CirShape shape;
   shape.first_path_idx = fp;
-  shape.kurtosis = var > 1e-12 * (m2 / count) ? mu4 / (var * var) : 0.0;
-  const double mean_tap = sum_qt / sum_q;
-  shape.mean_excess_delay_ns = mean_tap * o.tap_ns;
-  shape.rms_delay_spread_ns = std::sqrt(std::max(0.0, sum_qtt / sum_q - mean_tap * mean_tap)) * o.tap_ns;
-  shape.early_energy = early / sum_q;
-  shape.peak_delay_ns = (peak_tap - fp) * o.tap_ns;
+  shape.kurtosis = window.moments.kurtosis(static_cast<double>(end - begin));
+  shape.mean_excess_delay_ns = window.above_noise.mean_taps() * o.tap_ns;
+  shape.rms_delay_spread_ns = window.above_noise.rms_taps() * o.tap_ns;
+  shape.early_energy = sum(window.early) / above_noise;
+  shape.peak_delay_ns = (window.strongest() - fp) * o.tap_ns;
   shape.noise_rms = std::sqrt(noise_power);
   for (std::size_t k = fp_tap + 1; k <= fp_tap + 3 && k < n; ++k) shape.first_path_energy += taps.power(k);
-  for (std::size_t k = end; k < n; ++k) all += taps.power(k);
-  if (has_noise && !(n < k_whole_record)) shape.whole = whole_shape(taps, n, fp, o.tap_ns);
+  if (o.whole_record && has_noise && !(n < k_whole_record)) {
+    Record record{fp};
+    add_all(taps, 0, n, record);
+    shape.whole = {record.moments.kurtosis(static_cast<double>(n)), record.delays.mean_taps() * o.tap_ns,
+                   record.delays.rms_taps() * o.tap_ns};
+  }
+  const double all = sum(window.moments.m2) + taps.energy(end, n);
   shape.energy = std::max(0.0, all - noise_power * static_cast<double>(n - begin));
   return shape;
+}
+
+// The same source for every machine: what differs is how wide the registers are.
+template <class Taps>
+std::optional<CirShape> in_any_registers(const Taps& taps, std::size_t n,
+                                         std::optional<double> first_path_idx, const CirOptions& o) {
+  return shape_of(taps, n, first_path_idx, o);
+}
+#if defined(__x86_64__)
+template <class Taps>
+__attribute__((target("avx2"))) std::optional<CirShape> in_avx2(const Taps& taps, std::size_t n,
+                                                                std::optional<double> first_path_idx,
+                                                                const CirOptions& o) {
+  return shape_of(taps, n, first_path_idx, o);
+}
+const bool k_avx2 = __builtin_cpu_supports("avx2") != 0;
+#endif
+
+template <class Taps>
+std::optional<CirShape> widest(const Taps& taps, std::size_t n, std::optional<double> first_path_idx,
+                               const CirOptions& o) {
+#if defined(__x86_64__)
+  if (k_avx2 && o.wide_registers) return in_avx2(taps, n, first_path_idx, o);
+#endif
+  return in_any_registers(taps, n, first_path_idx, o);
 }
 
 }  // namespace
 
 std::optional<CirShape> cir_shape(std::span<const std::int16_t> re_im, std::optional<double> first_path_idx,
                                   const CirOptions& options) {
-  return shape_of(Complex{re_im.data()}, re_im.size() / 2, first_path_idx, options);
+  return widest(Complex{re_im.data()}, re_im.size() / 2, first_path_idx, options);
 }
 
 std::optional<CirShape> cir_shape(std::span<const float> magnitude, std::optional<double> first_path_idx,
                                   const CirOptions& options) {
-  return shape_of(Magnitude{magnitude.data()}, magnitude.size(), first_path_idx, options);
+  return widest(Magnitude{magnitude.data()}, magnitude.size(), first_path_idx, options);
 }
 
 }  // namespace anchord::nlos

@@ -21,6 +21,8 @@ struct CirOptions {
   double detect_rms =
       6.4;  ///< first path: first tap above this many rms of the noise (median of the maker's own threshold)
   std::optional<double> noise_rms{};  ///< of a record without such taps, where its source knows it
+  bool whole_record = true;           ///< whether WholeRecordShape is wanted: six sevenths of the work
+  bool wide_registers = true;         ///< where the machine has them: the answer is the same to the last bit
   double keep_rms = 3.0;  ///< delays count only taps above this many rms of the noise, less the noise power
 };
 

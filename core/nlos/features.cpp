@@ -30,7 +30,7 @@ void set_levels(const DiagnosticSample& s, FeatureVector& out, std::optional<dou
   rx = c && n ? received_dbm(*c, *n, s.prf) : s.rx_dbm;
   fp = amplitudes && n ? first_path_dbm(*s.fp_amp1, *s.fp_amp2, *s.fp_amp3, *n, s.prf) : s.fp_dbm;
   std::optional<double> d = difference(rx, fp);
-  if (c && amplitudes) d = power_difference_db(*c, *s.fp_amp1, *s.fp_amp2, *s.fp_amp3);
+  if (c && amplitudes && !n) d = power_difference_db(*c, *s.fp_amp1, *s.fp_amp2, *s.fp_amp3);
   if (s.cir && n) {  // computed from the CIR where no register said it
     const double n2 = *n * *n;
     if (!rx && s.cir->energy > 0) rx = 10 * std::log10(s.cir->energy / n2) - power_constant_db(s.prf);
@@ -43,8 +43,8 @@ void set_levels(const DiagnosticSample& s, FeatureVector& out, std::optional<dou
   out.set(Feature::rx_minus_fp_db, d);
 }
 
-void set_noise(const DiagnosticSample& s, std::optional<double> rx, FeatureVector& out) {
-  const auto n = positive(s.preamble_count);
+void set_noise(const DiagnosticSample& s, std::optional<double> rx, std::optional<double> preamble_db,
+               FeatureVector& out) {
   auto noise = positive(s.std_noise);
   double floor_db = k_noise_floor_db;
   if (!noise && s.cir) {
@@ -52,16 +52,17 @@ void set_noise(const DiagnosticSample& s, std::optional<double> rx, FeatureVecto
     floor_db = k_cir_noise_floor_db;
   }
   if (!noise) return;
-  if (n) out.set(Feature::noise_excess_db, db20(*noise / std::sqrt(*n)) - floor_db);
+  const double noise_db = db20(*noise);
+  if (preamble_db) out.set(Feature::noise_excess_db, noise_db - 0.5 * *preamble_db - floor_db);
   if (s.fp_amp1 && s.fp_amp2 && s.fp_amp3) {
     const double top = std::max({*s.fp_amp1, *s.fp_amp2, *s.fp_amp3});
-    if (top > 0) out.set(Feature::fp_snr_db, db20(top / *noise));
+    if (top > 0) out.set(Feature::fp_snr_db, db20(top) - noise_db);
   }
-  if (rx && n)
-    out.set(Feature::total_snr_db, *rx + power_constant_db(s.prf) + db20(*n) - db20(*noise));
+  if (rx && preamble_db)
+    out.set(Feature::total_snr_db, *rx + power_constant_db(s.prf) + *preamble_db - noise_db);
   else if (const auto c = positive(s.cir_power))
-    out.set(Feature::total_snr_db, 10 * std::log10(*c * 131072.0) - db20(*noise));
-  if (const auto top = positive(s.max_noise)) out.set(Feature::max_noise_db, db20(*top / *noise));
+    out.set(Feature::total_snr_db, 10 * std::log10(*c * 131072.0) - noise_db);
+  if (const auto top = positive(s.max_noise)) out.set(Feature::max_noise_db, db20(*top) - noise_db);
 }
 
 double quantile(std::vector<double>& sorted, double q) {
@@ -136,12 +137,6 @@ bool live_ranges_have(Feature feature) {
   return needs == Needs::range || needs == Needs::impulse;
 }
 
-void FeatureVector::set(Feature feature, std::optional<double> value) {
-  if (!value || !std::isfinite(*value)) return;
-  values[static_cast<std::size_t>(feature)] = *value;
-  present.set(static_cast<std::size_t>(feature));
-}
-
 std::optional<double> FeatureVector::get(Feature feature) const {
   const auto at = static_cast<std::size_t>(feature);
   if (!present.test(at)) return std::nullopt;
@@ -152,15 +147,17 @@ FeatureVector compute_features(const DiagnosticSample& s) {
   FeatureVector out;
   std::optional<double> rx, fp;
   set_levels(s, out, rx, fp);
-  set_noise(s, rx, out);
-  const auto range = positive(s.range_m);
-  if (range) {
+  std::optional<double> preamble_db;
+  if (const auto n = positive(s.preamble_count)) preamble_db = db20(*n);
+  out.set(Feature::preamble_db, preamble_db);
+  set_noise(s, rx, preamble_db, out);
+  if (const auto range = positive(s.range_m)) {
+    const double range_db = db20(*range);
     out.set(Feature::range_m, *range);
-    out.set(Feature::range_db, db20(*range));
-    if (rx) out.set(Feature::rx_free_space_db, *rx + db20(*range));
-    if (fp) out.set(Feature::fp_free_space_db, *fp + db20(*range));
+    out.set(Feature::range_db, range_db);
+    if (rx) out.set(Feature::rx_free_space_db, *rx + range_db);
+    if (fp) out.set(Feature::fp_free_space_db, *fp + range_db);
   }
-  if (const auto n = positive(s.preamble_count)) out.set(Feature::preamble_db, db20(*n));
   const auto f1 = positive(s.fp_amp1), f2 = positive(s.fp_amp2), f3 = positive(s.fp_amp3);
   if (f1 && f2) out.set(Feature::fp_shape12_db, db20(*f1 / *f2));
   if (f3 && f2) out.set(Feature::fp_shape32_db, db20(*f3 / *f2));

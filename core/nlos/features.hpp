@@ -2,6 +2,7 @@
 
 #include <array>
 #include <bitset>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -127,7 +128,11 @@ struct FeatureVector {
   std::array<double, k_feature_count> values{};
   std::bitset<k_feature_count> present{};
 
-  void set(Feature feature, std::optional<double> value);
+  void set(Feature feature, std::optional<double> value) {
+    if (!value || !std::isfinite(*value)) return;
+    values[static_cast<std::size_t>(feature)] = *value;
+    present.set(static_cast<std::size_t>(feature));
+  }
   std::optional<double> get(Feature feature) const;
 };
 

@@ -69,16 +69,16 @@ void live_whole_flight(benchmark::State& state) {
 }
 BENCHMARK(live_whole_flight)->Unit(benchmark::kMillisecond);
 
-/// 10 000 ranges to 50 anchors of a campus, in one solve with everything they share.
-void solve_fifty_anchors(benchmark::State& state) {
+/// Ranges to the anchors of a campus, 50 a second, as many to each.
+FlightData campus(int n_anchors, int ranges_each) {
   sim::Random random(23);
   FlightData flight;
   flight.mission.frame = TrackFrame::local;
   std::vector<Eigen::Vector3d> anchors;
-  for (int a = 0; a < 50; ++a)
-    anchors.emplace_back(-36.0 + 8.0 * (a % 10), -24.0 + 12.0 * static_cast<double>(a / 10),
+  for (int a = 0; a < n_anchors; ++a)
+    anchors.emplace_back(-36.0 + 8.0 * (a % 10), -24.0 + 12.0 * static_cast<double>(a / 10 % 5),
                          2.0 + 6.0 * random.uniform());
-  for (int i = 0; i < 2000; ++i) {
+  for (int i = 0; i < n_anchors * ranges_each / 5; ++i) {
     const double turn = 0.01 * i;
     Fix fix;
     fix.frame = TrackFrame::local;
@@ -87,7 +87,7 @@ void solve_fifty_anchors(benchmark::State& state) {
     fix.local_m = {45 * std::cos(turn), 30 * std::sin(1.3 * turn), 12 + 7 * std::sin(2.1 * turn)};
     flight.fixes.push_back(fix);
     for (int k = 0; k < 5; ++k) {
-      const auto a = static_cast<std::size_t>((5 * i + k) % 50);
+      const auto a = static_cast<std::size_t>((5 * i + k) % n_anchors);
       Range range;
       range.time = fix.time;
       range.tag = NetworkId{0x6e01};
@@ -96,9 +96,25 @@ void solve_fifty_anchors(benchmark::State& state) {
       flight.ranges.push_back(range);
     }
   }
+  return flight;
+}
+
+/// 10 000 ranges to 50 anchors, in one solve with everything they share.
+void solve_fifty_anchors(benchmark::State& state) {
+  const FlightData flight = campus(50, 200);
   for (auto _ : state) benchmark::DoNotOptimize(solve_flight(flight).value().anchors.size());
 }
 BENCHMARK(solve_fifty_anchors)->Unit(benchmark::kMillisecond);
+
+/// 1 000 ranges to each of so many anchors: a whole solve, shown an anchor.
+void solve_anchors(benchmark::State& state) {
+  const FlightData flight = campus(static_cast<int>(state.range(0)), 1000);
+  for (auto _ : state) benchmark::DoNotOptimize(solve_flight(flight).value().anchors.size());
+  state.counters["s_per_anchor"] =
+      benchmark::Counter(static_cast<double>(state.range(0)),
+                         benchmark::Counter::kIsIterationInvariantRate | benchmark::Counter::kInvert);
+}
+BENCHMARK(solve_anchors)->Arg(10)->Arg(50)->Arg(200)->Unit(benchmark::kMillisecond);
 
 /// Time of one range through the live path, most of which only join it and some of which solve its anchor.
 void live_update(benchmark::State& state) {

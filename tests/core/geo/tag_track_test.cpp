@@ -88,4 +88,29 @@ TEST(TagTrack, LeavesOutPosesThatAreNotFinite) {
 }
 
 }  // namespace
+// Epochs at 10 Hz with two pauses, the longer of them most of the flight, and one epoch by itself.
+TEST(TagTrack, FindsTheNeighboursOfEveryInstantHoweverUnevenTheTrackIs) {
+  std::vector<double> times_s{0};
+  for (int i = 0; i < 40; ++i) times_s.push_back(3 + 0.1 * i);
+  for (int i = 0; i < 300; ++i) times_s.push_back(4000 + 0.1 * i + 0.03 * (i % 3));
+  std::vector<Fix> fixes;
+  for (const double t_s : times_s) fixes.push_back(fix_at(t_s, {std::sin(t_s), std::cos(t_s), t_s}));
+  TrackOptions any_gap;
+  any_gap.max_gap_s = 1e6;
+  const TagTrack track(fixes, std::nullopt, UtcTime{}, any_gap);
+  for (std::size_t i = 1; i < times_s.size(); ++i) {
+    const double from_s = times_s[i - 1], to_s = times_s[i];
+    for (const double share : {0.0, 1e-9, 0.25, 0.5, 1 - 1e-9}) {
+      const double t_s = from_s + share * (to_s - from_s), part = (t_s - from_s) / (to_s - from_s);
+      const TagPoint point = track.at(t_s);
+      ASSERT_EQ(point.refused, TrackRefusal::none) << t_s;
+      EXPECT_NEAR(point.position_m.x(), (1 - part) * std::sin(from_s) + part * std::sin(to_s), 1e-9) << t_s;
+      EXPECT_NEAR(point.velocity_mps.z(), 1, 1e-6) << t_s;
+    }
+  }
+  EXPECT_EQ(track.at(times_s.back()).refused, TrackRefusal::none);
+  EXPECT_EQ(track.at(-1e-9).refused, TrackRefusal::outside);
+  EXPECT_EQ(track.at(times_s.back() + 1e-6).refused, TrackRefusal::outside);
+}
+
 }  // namespace anchord

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <utility>
 #include <vector>
 
 namespace anchord::nlos {
@@ -103,6 +104,88 @@ TEST(CirShape, OfAWholeRecordIsAsPrintedAndCanExceedThePrintedThreshold) {
   EXPECT_NEAR(shape->whole->mean_excess_delay_ns, -300, 1e-9);
   const double p = 2.0 / 1016;  // |h| is Bernoulli
   EXPECT_NEAR(shape->whole->kurtosis, (1 - 3 * p * (1 - p)) / (p * (1 - p)), 1e-6);
+}
+
+// Two passes over each number in turn, in long double, by the printed formulas.
+TEST(CirShape, OfRandomRecordsMatchesThePrintedFormulasTakenOneTapAtATime) {
+  std::uint32_t state = 7;
+  const auto part = [&state](int most) {
+    state = state * 1664525U + 1013904223U;
+    return static_cast<std::int16_t>(static_cast<int>(state >> 8) % (2 * most + 1) - most);
+  };
+  for (const std::size_t n : {1016, 992, 1013, 800, 811}) {
+    std::vector<std::int16_t> re_im;
+    for (std::size_t k = 0; k < n; ++k)
+      for (int i = 0; i < 2; ++i) re_im.push_back(part(k < 746 ? 90 : 6000 / static_cast<int>(k - 740)));
+    re_im[4] = re_im[5] = re_im[1500] = re_im[1501] = -32768;  // the strongest there is
+    re_im[1504] = re_im[1505] = 0;
+    const double fp = 746.3;
+    const auto shape = cir_shape(re_im, fp);
+    ASSERT_TRUE(shape);
+
+    using Real = long double;
+    std::vector<Real> power;
+    for (std::size_t k = 0; k < n; ++k)
+      power.push_back(static_cast<Real>(re_im[2 * k]) * re_im[2 * k] +
+                      static_cast<Real>(re_im[2 * k + 1]) * re_im[2 * k + 1]);
+    const auto kurtosis = [&](std::size_t begin, std::size_t end) {
+      Real mean = 0, m2 = 0, m4 = 0;
+      for (std::size_t k = begin; k < end; ++k) mean += std::sqrt(power[k]) / static_cast<Real>(end - begin);
+      for (std::size_t k = begin; k < end; ++k) {
+        const Real d = (std::sqrt(power[k]) - mean) * (std::sqrt(power[k]) - mean);
+        m2 += d / static_cast<Real>(end - begin);
+        m4 += d * d / static_cast<Real>(end - begin);
+      }
+      return static_cast<double>(m4 / (m2 * m2));
+    };
+    const auto delays_ns = [&](std::size_t begin, std::size_t end, Real keep, Real less) {
+      Real all = 0, mean = 0, square = 0;
+      const auto q = [&](std::size_t k) { return power[k] > keep ? power[k] - less : 0; };
+      for (std::size_t k = begin; k < end; ++k) all += q(k);
+      for (std::size_t k = begin; k < end; ++k) mean += q(k) / all * (static_cast<Real>(k) - fp);
+      for (std::size_t k = begin; k < end; ++k) {
+        const Real d = static_cast<Real>(k) - fp - mean;
+        square += q(k) / all * d * d;
+      }
+      const Real tap_ns = CirOptions{}.tap_ns;
+      return std::pair{static_cast<double>(mean * tap_ns), static_cast<double>(std::sqrt(square) * tap_ns)};
+    };
+    Real noise = 0, from_window = 0;
+    for (std::size_t k = 50; k < 650; ++k) noise += power[k] / 600;
+    for (std::size_t k = 741; k < n; ++k) from_window += power[k] - noise;
+    EXPECT_NEAR(shape->noise_rms, static_cast<double>(std::sqrt(noise)), 1e-11);
+    EXPECT_NEAR(shape->energy / static_cast<double>(from_window), 1, 1e-12);
+    EXPECT_NEAR(shape->kurtosis / kurtosis(741, 791), 1, 1e-12) << n;
+    const auto [mean_ns, rms_ns] = delays_ns(741, 791, 9 * noise, noise);
+    EXPECT_NEAR(shape->mean_excess_delay_ns, mean_ns, 1e-12 * rms_ns) << n;
+    EXPECT_NEAR(shape->rms_delay_spread_ns / rms_ns, 1, 1e-12) << n;
+    EXPECT_NEAR(shape->peak_delay_ns, (750 - fp) * CirOptions{}.tap_ns, 1e-12);
+    ASSERT_EQ(shape->whole.has_value(), n >= 992);
+    if (!shape->whole) continue;
+    const auto [whole_mean_ns, whole_rms_ns] = delays_ns(0, n, -1, 0);
+    EXPECT_NEAR(shape->whole->kurtosis / kurtosis(0, n), 1, 1e-12) << n;
+    EXPECT_NEAR(shape->whole->mean_excess_delay_ns, whole_mean_ns, 1e-12 * whole_rms_ns) << n;
+    EXPECT_NEAR(shape->whole->rms_delay_spread_ns / whole_rms_ns, 1, 1e-12) << n;
+
+    CirOptions narrow;
+    narrow.wide_registers = false;
+    const auto same = cir_shape(re_im, fp, narrow);
+    ASSERT_TRUE(same && same->whole);
+    EXPECT_EQ(same->kurtosis, shape->kurtosis);
+    EXPECT_EQ(same->rms_delay_spread_ns, shape->rms_delay_spread_ns);
+    EXPECT_EQ(same->early_energy, shape->early_energy);
+    EXPECT_EQ(same->energy, shape->energy);
+    EXPECT_EQ(same->whole->kurtosis, shape->whole->kurtosis);
+    EXPECT_EQ(same->whole->rms_delay_spread_ns, shape->whole->rms_delay_spread_ns);
+
+    CirOptions window_only;
+    window_only.whole_record = false;
+    const auto less = cir_shape(re_im, fp, window_only);
+    ASSERT_TRUE(less);
+    EXPECT_FALSE(less->whole);
+    EXPECT_EQ(less->kurtosis, shape->kurtosis);
+    EXPECT_EQ(less->energy, shape->energy);
+  }
 }
 
 TEST(CirShape, IsTheSameForComplexTapsAndTheirMagnitude) {
