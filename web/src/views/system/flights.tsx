@@ -1,7 +1,15 @@
-/// Stored flights: which there are, deleting one, and getting it back.
+/// Stored flights: which there are, handing one over, deleting one, and getting it back.
 import { useEffect, useState } from 'preact/hooks';
 import { error_text } from '../../api/client';
-import { delete_flight, deleted_flights, restore_flight, stored_flights, type StoredFlight } from '../../api/missions';
+import {
+  delete_flight,
+  deleted_flights,
+  handover_name,
+  handover_url,
+  restore_flight,
+  stored_flights,
+  type StoredFlight,
+} from '../../api/missions';
 import { may } from '../../state/session';
 import { load_missions } from '../../state/archive';
 import { events, say } from '../../state/store';
@@ -70,6 +78,7 @@ export function FlightsPanel() {
             <th scope="col">State</th>
             <th scope="col">Ranges</th>
             <th scope="col">Fixes</th>
+            <th scope="col">Hand over</th>
             {operator && (
               <th scope="col">
                 <span class="sr">Delete</span>
@@ -87,6 +96,17 @@ export function FlightsPanel() {
               <td>{f.state.toUpperCase()}</td>
               <td>{grouped(f.n_ranges)}</td>
               <td>{grouped(f.n_fixes)}</td>
+              <td>
+                <a
+                  class="btn small"
+                  href={handover_url(f.id)}
+                  download={handover_name(f.name || f.id)}
+                  aria-label={`Hand-over pack of ${f.name || f.id.slice(0, 8)}`}
+                  data-testid="handover-flight"
+                >
+                  Download
+                </a>
+              </td>
               {operator && (
                 <td class="acts">
                   {f.state === 'recording' ? (
