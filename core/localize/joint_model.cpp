@@ -111,6 +111,7 @@ class LineSums {
     const Eigen::Matrix<double, k_columns, k_columns> all = totals();
     constexpr std::array own{0, 1, 2, 3};
     constexpr int residual = k_columns - 1;
+    static_assert(k_shared_bias == 0 && k_shared_left == 5 && k_shared_antennas == 6);
     // Column of the sums that each shared unknown has.
     std::array<int, k_shared_size> column{3, 4, 5, 6, 7, 8, -1, -1, -1, -1};
     if (arm) column[static_cast<std::size_t>(k_shared_antennas + *arm)] = 6;

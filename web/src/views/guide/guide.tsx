@@ -23,7 +23,7 @@ export const Blocks = ({ blocks }: { blocks: readonly Block[] }) => (
           ))}
         </ul>
       ) : (
-        <div key={i} class="scrollx">
+        <div key={i} class="scrollx" tabIndex={0} role="region" aria-label={b.head[0]}>
           <table class="tbl">
             <thead>
               <tr>

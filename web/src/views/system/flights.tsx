@@ -101,7 +101,7 @@ export function FlightsPanel() {
                   class="btn small"
                   href={handover_url(f.id)}
                   download={handover_name(f.name || f.id)}
-                  aria-label={`Hand-over pack of ${f.name || f.id.slice(0, 8)}`}
+                  aria-label={`Download the hand-over pack of ${f.name || f.id.slice(0, 8)}`}
                   data-testid="handover-flight"
                 >
                   Download
