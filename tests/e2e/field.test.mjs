@@ -2,7 +2,7 @@
 // from the side beside every map. Real server, a simulated flight that is played into it while the page is open.
 import assert from 'node:assert/strict';
 import { spawn } from 'node:child_process';
-import { mkdtempSync, rmSync } from 'node:fs';
+import { mkdtempSync, readFileSync, rmSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { after, before, test } from 'node:test';
@@ -149,4 +149,29 @@ test('the rover is on the map of the plan: a corner is set where it is, and an o
   } finally {
     playing.kill('SIGINT');
   }
+});
+
+test('a finished flight is handed over as one zip file, one that is being recorded is not yet', async () => {
+  const made = await server.fetch('/api/v1/missions', {
+    json: { name: 'in the air', frame: 'wgs84', track_point: 'tag_antenna' },
+    headers: { 'idempotency-key': 'in the air' },
+  });
+  assert.equal(made.status, 201, await made.text());
+  const { page, seen } = await openPage(browser, server, { hash: '#/system' });
+  const row = (name) => page.getByRole('row').filter({ has: page.getByRole('rowheader', { name }) });
+  await row('in the air').waitFor();
+  assert.equal(await row('in the air').getByTestId('handover-flight').count(), 0);
+  const finished = (await get('/api/v1/missions')).items.find((m) => m.state === 'finished');
+  const coming = page.waitForEvent('download');
+  await row(finished.name).getByTestId('handover-flight').click();
+  const pack = await coming;
+  assert.match(pack.suggestedFilename(), /^handover-.+\.zip$/);
+  assert.equal(
+    readFileSync(await pack.path())
+      .subarray(0, 4)
+      .toString('latin1'),
+    'PK\x03\x04',
+  );
+  assert.deepEqual(seen.errors, []);
+  await page.close();
 });

@@ -26,12 +26,8 @@ export async function delete_flight(id: string, admin: boolean): Promise<void> {
 export const restore_flight = (id: string): Promise<unknown> =>
   call('post', '/missions/{id}/restore', { ...at(id), headers: { 'Idempotency-Key': idempotency_key() } });
 
-/// What is handed over after a flight, in one signed zip file: the bundle, the report and the published anchors.
+/// What is handed over after a flight, in one signed zip file, which the server names: the bundle, the report and the published anchors.
 export const handover_url = (id: string): string => api_url(`/missions/${encodeURIComponent(id)}/handover`);
-
-/// A file name of any system: what is no letter or digit is a dash.
-export const handover_name = (flight: string): string =>
-  `${flight.replace(/[^\p{L}\p{N}]+/gu, '-').replace(/^-|-$/g, '') || 'flight'}-handover.zip`;
 
 export const devices_of = async (id: string): Promise<Devices | null> =>
   (await get('/missions/{id}', at(id))).devices ?? null;

@@ -12,7 +12,7 @@ import {
   type Calibration,
   type Moved,
 } from '../api/anchors';
-import { handover_name, handover_url } from '../api/missions';
+import { handover_url } from '../api/missions';
 import type { EstimateMsg, MissionMsg } from '../live/messages';
 import { enu_from_geodetic } from '../map/enu';
 import { may } from '../state/session';
@@ -225,16 +225,18 @@ export function Publish({ mission }: { mission: MissionMsg }) {
             <a class="btn" href={report_url(draft.id)} target="_blank" rel="noreferrer" data-testid="report">
               Report to print
             </a>
-            <a
-              class="btn"
-              href={handover_url(mission.mission)}
-              download={handover_name(mission.name || mission.mission)}
-              data-testid="handover"
-              title="One zip file: the flight, the report of the newest published calibration and the published anchors, signed"
-            >
-              <Icon name="download" />
-              Hand-over pack
-            </a>
+            {mission.state !== 'recording' && (
+              <a
+                class="btn"
+                href={handover_url(mission.mission)}
+                download
+                data-testid="handover"
+                title="One zip file: the flight, the report of the newest published calibration and the published anchors, signed"
+              >
+                <Icon name="download" />
+                Hand-over pack
+              </a>
+            )}
             {lacking.length > 0 && may('operator') && (
               <button class="btn" data-testid="fly-again" disabled={busy !== ''} onClick={fly_again}>
                 {busy === 'planning' ? 'Planning' : `Fly again for ${lacking.length}`}

@@ -4,7 +4,6 @@ import { error_text } from '../../api/client';
 import {
   delete_flight,
   deleted_flights,
-  handover_name,
   handover_url,
   restore_flight,
   stored_flights,
@@ -97,15 +96,17 @@ export function FlightsPanel() {
               <td>{grouped(f.n_ranges)}</td>
               <td>{grouped(f.n_fixes)}</td>
               <td>
-                <a
-                  class="btn small"
-                  href={handover_url(f.id)}
-                  download={handover_name(f.name || f.id)}
-                  aria-label={`Download the hand-over pack of ${f.name || f.id.slice(0, 8)}`}
-                  data-testid="handover-flight"
-                >
-                  Download
-                </a>
+                {f.state !== 'recording' && (
+                  <a
+                    class="btn small"
+                    href={handover_url(f.id)}
+                    download
+                    aria-label={`Download the hand-over pack of ${f.name || f.id.slice(0, 8)}`}
+                    data-testid="handover-flight"
+                  >
+                    Download
+                  </a>
+                )}
               </td>
               {operator && (
                 <td class="acts">
