@@ -1,7 +1,15 @@
 import { describe, expect, it } from 'vitest';
 import { procedure } from '../src/live/flight_messages';
 import { estimate, mission } from '../src/live/messages';
-import { as_shown, done_count, goal_of, likelier } from '../src/state/done';
+import {
+  accuracy_goal,
+  against_goal,
+  as_shown,
+  done_count,
+  goal_of,
+  likelier,
+  over_goal_words,
+} from '../src/state/done';
 import { Scene } from '../src/state/scene';
 import { STATUS_LOOK } from '../src/ui/marks';
 import { why_not_done } from '../src/ui/words';
@@ -88,5 +96,36 @@ describe('the likelier of two solutions', () => {
     expect(e.enu_m).toEqual([0, 0, 6]);
     expect(e.ellipse95!.azimuth_deg).toBe(20);
     expect(e.cov_enu_m2![1]).toBe(1);
+  });
+});
+
+describe('an anchor of a calibration', () => {
+  const limits = { h95_m: 0.2, v95_m: 0.4 },
+    of = (status: string, h95_m: number | null, v95_m: number | null) => ({
+      ...anchor('0x1', 'estimating'),
+      status: status as 'passes' | 'withheld',
+      h95_m,
+      v95_m,
+    }),
+    look = (h95_m: number | null, v95_m: number | null) =>
+      STATUS_LOOK[against_goal(of('passes', h95_m, v95_m), limits).status];
+  it('is green within the goal, amber over it or where its accuracy is not known', () => {
+    expect(look(0.2, 0.4)[1]).toBe('ok');
+    for (const [h, v] of [
+      [3.4, 0.1],
+      [0.1, 0.81],
+      [null, 0.1],
+    ] as const)
+      expect(look(h, v)[1]).toBe('caution');
+    expect(over_goal_words(of('passes', 3.4, 0.81), limits)).toBe('over the goal 0.20 m');
+    expect(over_goal_words(of('passes', 0.1, 0.81), limits)).toBe('over the vertical goal 0.40 m');
+  });
+  it('is never green where nobody named a goal, and withheld whatever its accuracy', () => {
+    expect(STATUS_LOOK[against_goal(of('passes', 0.01, 0.01), null).status][1]).not.toBe('ok');
+    expect(against_goal(of('withheld', 0.01, 0.01), limits).status).toBe('withheld');
+  });
+  it('has the goal that the live estimates were held against', () => {
+    expect(accuracy_goal([anchor('0x1', 'estimating')])?.h95_m).toBe(0.25);
+    expect(accuracy_goal([{ ...anchor('0x1', 'estimating'), gates: [] }])).toBeNull();
   });
 });

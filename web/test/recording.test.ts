@@ -1,6 +1,6 @@
 import { describe, expect, it } from 'vitest';
 import { estimate, type MissionMsg, type RangeMsg } from '../src/live/messages';
-import { after, marks_of, neighbour, Player, poses_of, type Recording } from '../src/state/recording';
+import { after, marks_of, neighbour, Player, poses_of, range_of, type Recording } from '../src/state/recording';
 
 const mission: MissionMsg = {
   mission: 'm',
@@ -132,5 +132,20 @@ describe('events of a recording', () => {
     expect(way(0, 1)).toEqual([100, 200, 300]);
     expect(way(599, -1)).toEqual([300, 200, 100]);
     expect(way(250, -1)).toEqual([200, 100]);
+  });
+});
+
+describe('a stored range', () => {
+  const row = { t_us: 1, anchor: '0x2', tag: '0x1', distance_m: 5.3 };
+  it('has the class and the correction of the models where the server gives them', () => {
+    const r = range_of('m')({ ...row, predicted: { class: 'nlos', p_los: 0.1, bias_m: 0.3, models: {} } })!;
+    expect(r.p_los).toBe(0.1);
+    expect(r.corrected_m).toBeCloseTo(5);
+  });
+  it('is as measured where no model is promoted', () => {
+    for (const predicted of [undefined, null, { class: 'unclear', p_los: null, bias_m: null }]) {
+      const r = range_of('m')({ ...row, predicted })!;
+      expect([r.p_los, r.corrected_m]).toEqual([null, 5.3]);
+    }
   });
 });

@@ -11,6 +11,7 @@ import {
   STATUS,
   vec3,
   VERDICT,
+  type AnchorStatus,
   type EstimateMsg,
   type GateMsg,
   type Mirror,
@@ -100,6 +101,14 @@ function crs_words(v: unknown): string {
     .join(', ');
 }
 
+/// An anchor of a calibration has no status: it passes its gates or is withheld, as the report says. Null: the server's word stands.
+function status_of(status: string, verdict: string, acceptable: unknown): AnchorStatus | null {
+  if ((STATUS as readonly string[]).includes(status)) return null;
+  if (status === 'contradicted') return 'moved';
+  if (verdict === 'ambiguous') return 'ambiguous';
+  return verdict === 'ok' && acceptable !== false ? 'passes' : 'withheld';
+}
+
 /// `properties` of a GeoJSON feature or one anchor of a calibration; `geometry` beside it.
 export function row_of(p: Record<string, unknown>, geometry: unknown): AnchorRow | null {
   const network_id = str(p.network_id);
@@ -118,17 +127,7 @@ export function row_of(p: Record<string, unknown>, geometry: unknown): AnchorRow
     anchor: network_id,
     mission: Array.isArray(provenance?.missions) ? str(provenance.missions[0]) : '',
     verdict: known ? verdict : 'ok',
-    status: (STATUS as readonly string[]).includes(status)
-      ? status
-      : status === 'contradicted'
-        ? 'moved'
-        : verdict === 'ambiguous'
-          ? 'ambiguous'
-          : verdict === 'ok' && quality?.acceptable !== false
-            ? 'converged'
-            : geometry
-              ? 'estimating'
-              : 'found',
+    status: (STATUS as readonly string[]).includes(status) ? status : 'found',
     reason: contradiction || str(quality?.reason) || str(p.reason),
     ...point(geometry),
     enu_m: p.enu_m ?? p.local_m,
@@ -146,6 +145,7 @@ export function row_of(p: Record<string, unknown>, geometry: unknown): AnchorRow
   const other_side = mirror_of(p.mirror);
   return {
     ...base,
+    status: status_of(status, verdict, quality?.acceptable) ?? base.status,
     ellipse95: ellipse(relative?.ellipse95) ?? (cov && ellipse_from_covariance(cov)),
     mirror: other_side,
     contradiction,
@@ -182,6 +182,9 @@ export function rows_of_collection(answer: unknown): { rows: AnchorRow[]; revisi
       rows.reduce<number | null>((r, x) => (x.revision === null ? r : Math.max(r ?? 0, x.revision)), null),
   };
 }
+/// What the flight itself estimates of its anchors.
+export const live_rows = async (mission: string): Promise<readonly AnchorRow[]> =>
+  rows_of_collection(await request('GET', `/anchors?view=live&mission=${encodeURIComponent(mission)}&limit=1000`)).rows;
 export const published = async (): Promise<{ rows: AnchorRow[]; revision: number | null }> =>
   rows_of_collection(await request('GET', '/anchors?limit=1000'));
 

@@ -3,8 +3,20 @@
 
 export type Vec3 = readonly [number, number, number];
 export type FixClass = 'none' | 'single' | 'dgps' | 'float' | 'fixed';
-/// `gave_up` is not on the wire: the procedure ended its work on the anchor without its accuracy (state/done.ts).
-export type AnchorStatus = 'found' | 'estimating' | 'converged' | 'ambiguous' | 'accepted' | 'moved' | 'gave_up';
+/// Not on the wire are `gave_up`, where the procedure ended its work on the anchor without its accuracy, and those of a calibration: `withheld`, or
+/// `passes` its gates; and where the accuracy goal is known, `within_goal` or `over_goal` (state/done.ts).
+export type AnchorStatus =
+  | 'found'
+  | 'estimating'
+  | 'converged'
+  | 'ambiguous'
+  | 'accepted'
+  | 'moved'
+  | 'gave_up'
+  | 'withheld'
+  | 'passes'
+  | 'within_goal'
+  | 'over_goal';
 export type Verdict = 'ok' | 'weak_geometry' | 'ambiguous' | 'too_few' | 'diverged';
 
 export interface Place {

@@ -55,6 +55,10 @@ export const status_colour = (p: Palette, s: AnchorStatus): string =>
     accepted: p.ok,
     moved: p.bad,
     gave_up: p.caution,
+    withheld: p.off,
+    passes: p.info,
+    within_goal: p.ok,
+    over_goal: p.caution,
   })[s];
 export const range_colour = (p: Palette, c: RangeClass): string => ({ los: p.ok, nlos: p.caution, unclear: p.off })[c];
 export const trail_style = (p: Palette, fix: FixClass): { colour: string; dash: number[]; width: number } => {

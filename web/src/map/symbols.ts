@@ -58,6 +58,9 @@ export function anchor_symbol(c: Ctx, p: Palette, status: AnchorStatus, x: numbe
       c.fill();
       break;
     case 'converged':
+    case 'passes':
+    case 'within_goal':
+    case 'over_goal':
       ring();
       tick(c, x, y, r * 0.82);
       break;
@@ -69,6 +72,7 @@ export function anchor_symbol(c: Ctx, p: Palette, status: AnchorStatus, x: numbe
       tick(c, x, y, r);
       break;
     case 'gave_up':
+    case 'withheld':
       ring();
       c.beginPath();
       c.moveTo(x - r * 0.42, y);

@@ -2,6 +2,7 @@
 /// estimate, and, where a procedure flies, the target it works towards. No DOM.
 import type { AnchorTask, ProcedureMsg } from '../live/flight_messages';
 import type { EstimateMsg, MissionMsg } from '../live/messages';
+import { fixed } from '../ui/format';
 import type { Scene } from './scene';
 
 export const over = (p: ProcedureMsg | null | undefined): boolean => p?.status === 'done' || p?.status === 'aborted';
@@ -10,7 +11,7 @@ export const task_of = (p: ProcedureMsg | null | undefined, anchor: string): Anc
   p?.anchors.find((t) => t.anchor === anchor);
 
 /// The likelier of two solutions is the anchor; the other is drawn as its mirror. Reflected in the line between them, like its covariance.
-export function likelier(e: EstimateMsg): EstimateMsg {
+export function likelier<T extends EstimateMsg>(e: T): T {
   const m = e.mirror;
   if (!m?.enu_m || !e.enu_m || m.probability === null || e.probability === null || m.probability <= e.probability)
     return e;
@@ -100,4 +101,28 @@ export function goal_of(e: EstimateMsg | null, p: ProcedureMsg | null | undefine
   if (wanted_m != null) return { of: 'sigma', limit_m: wanted_m };
   const gate = e?.gates.find((g) => g.name === 'goal_h95_m');
   return gate?.limit == null ? null : { of: 'h95', limit_m: gate.limit };
+}
+
+/// The accuracy goal of the server. A calibration does not name it; the gates of the live estimates do.
+export interface AccuracyGoal {
+  readonly h95_m: number;
+  readonly v95_m: number;
+}
+export function accuracy_goal(estimates: readonly EstimateMsg[]): AccuracyGoal | null {
+  const limit = (name: string): number | undefined =>
+      estimates.flatMap((e) => e.gates).find((g) => g.name === name && g.limit !== null)?.limit ?? undefined,
+    [h95_m, v95_m] = [limit('goal_h95_m'), limit('goal_v95_m')];
+  return h95_m === undefined && v95_m === undefined ? null : { h95_m: h95_m ?? Infinity, v95_m: v95_m ?? Infinity };
+}
+/// Of the calibration an anchor that passes its gates is green only within the goal.
+export function against_goal<T extends EstimateMsg>(e: T, goal: AccuracyGoal | null): T {
+  if (e.status !== 'passes' || !goal) return e;
+  return { ...e, status: over_goal_words(e, goal) ? 'over_goal' : 'within_goal' };
+}
+/// Which goal it is over, and its limit; empty within. What is not known is not within.
+export function over_goal_words(e: EstimateMsg, goal: AccuracyGoal): string {
+  const over_h = (e.h95_m ?? Infinity) > goal.h95_m,
+    over_v = (e.v95_m ?? Infinity) > goal.v95_m;
+  if (over_h) return `over the goal ${fixed(goal.h95_m, 2)} m`;
+  return over_v ? `over the vertical goal ${fixed(goal.v95_m, 2)} m` : '';
 }

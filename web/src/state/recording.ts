@@ -92,11 +92,13 @@ export function poses_of(rows: readonly Record<string, unknown>[], mission: stri
     ];
   });
 }
-const range_of =
+/// Class and correction are what the promoted models make of it now; without one it is as measured.
+export const range_of =
   (mission: string) =>
   (o: Record<string, unknown>): RangeMsg | null => {
     const t_us = num(o.t_us),
-      distance_m = num(o.distance_m);
+      distance_m = num(o.distance_m),
+      predicted = obj(o.predicted);
     return t_us === null || distance_m === null
       ? null
       : {
@@ -105,10 +107,10 @@ const range_of =
           tag: str(o.tag),
           anchor: str(o.anchor),
           distance_m,
-          corrected_m: distance_m,
+          corrected_m: distance_m - (num(predicted?.bias_m) ?? 0),
           sigma_m: null,
           rss_dbm: num(o.rx_dbm) ?? num(o.rss_dbm),
-          p_los: null,
+          p_los: num(predicted?.p_los),
           used: true,
           refused: null,
         };
@@ -129,7 +131,7 @@ export async function load_recording(mission: MissionMsg): Promise<Recording> {
   const of = encodeURIComponent(mission.mission);
   const [fixes, ranges, events] = await Promise.all([
     pages(`/fixes?mission=${of}`, (o) => o),
-    pages(`/ranges?mission=${of}`, range_of(mission.mission)),
+    pages(`/ranges?mission=${of}&predicted=true`, range_of(mission.mission)),
     request('GET', `/missions/${of}/events?limit=1000`).then(
       (a) => {
         const items = obj(a)?.items;

@@ -197,9 +197,16 @@ export const STATUS_LOOK: Record<AnchorStatus | 'unseen', [Shape, Tone]> = {
   ambiguous: ['half', 'caution'],
   moved: ['bad', 'bad'],
   gave_up: ['off', 'caution'],
+  withheld: ['off', 'off'],
+  passes: ['ring', 'info'],
+  within_goal: ['ok', 'ok'],
+  over_goal: ['caution', 'caution'],
 };
+/// Within the goal or over it is for mark and colour: the report's word is the same.
+const status_word = (s: AnchorStatus): string =>
+  s === 'within_goal' || s === 'over_goal' ? 'PASSES' : s.replace('_', ' ').toUpperCase();
 export const StatusChip = ({ status }: { status: AnchorStatus }) => (
-  <Chip shape={STATUS_LOOK[status][0]} tone={STATUS_LOOK[status][1]} word={status.replace('_', ' ').toUpperCase()} />
+  <Chip shape={STATUS_LOOK[status][0]} tone={STATUS_LOOK[status][1]} word={status_word(status)} />
 );
 export const CLASS_LOOK: Record<RangeClass, [Shape, Tone, string]> = {
   los: ['ok', 'ok', 'LOS'],

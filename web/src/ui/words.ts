@@ -1,5 +1,5 @@
 /// Everything the page says about verdicts and reasons, in one place. No DOM.
-import type { EstimateMsg, Verdict } from '../live/messages';
+import type { AnchorStatus, EstimateMsg, Verdict } from '../live/messages';
 import { gate_line } from './gates';
 
 export const VERDICT_WORDS: Record<Verdict, string> = {
@@ -22,9 +22,10 @@ export const SOURCE_WORDS: Record<string, string> = {
 };
 const sentence = (text: string): string =>
   text ? `${text[0]!.toUpperCase()}${text.slice(1)}${/[.!?]$/.test(text) ? '' : '.'}` : '';
+const DONE: ReadonlySet<AnchorStatus> = new Set(['converged', 'accepted', 'passes', 'within_goal', 'over_goal']);
 /// Title and sentence of "why not done"; null when there is nothing to explain. `task`: what the procedure says of it, empty where it is content.
 export function why_not_done(e: EstimateMsg, task = ''): { title: string; text: string } | null {
-  if (e.verdict === 'ok' && (e.status === 'converged' || e.status === 'accepted')) return null;
+  if (e.verdict === 'ok' && DONE.has(e.status)) return null;
   if (e.status === 'gave_up')
     return {
       title: 'Given up: the flight ended its work here without the accuracy that was wanted',
@@ -48,7 +49,9 @@ export function why_not_done(e: EstimateMsg, task = ''): { title: string; text: 
     title:
       e.status === 'moved'
         ? 'It moved: the new estimate leaves the old 99 % ellipse'
-        : `Why not done: ${e.verdict === 'ok' ? 'not accurate enough yet' : VERDICT_WORDS[e.verdict]}`,
+        : e.status === 'withheld'
+          ? `Withheld: ${e.verdict === 'ok' ? 'a gate fails' : VERDICT_WORDS[e.verdict]}`
+          : `Why not done: ${e.verdict === 'ok' ? 'not accurate enough yet' : VERDICT_WORDS[e.verdict]}`,
     text: `${text}${text ? ' ' : ''}${advice[e.verdict]}`,
   };
 }

@@ -3,6 +3,7 @@ import { useEffect, useRef, useState } from 'preact/hooks';
 import { idempotency_key, error_text } from '../api/client';
 import {
   calibrate,
+  live_rows,
   moved_since_published,
   newest_calibration,
   note_of,
@@ -17,9 +18,10 @@ import type { EstimateMsg, MissionMsg } from '../live/messages';
 import { enu_from_geodetic } from '../map/enu';
 import { may } from '../state/session';
 import { keep_draft } from '../state/drafts';
+import { accuracy_goal, against_goal, over_goal_words, type AccuracyGoal } from '../state/done';
 import { current_scene, revision, say } from '../state/store';
 import { accuracy, date, fixed } from '../ui/format';
-import { Icon, Mark, StatusChip } from '../ui/marks';
+import { Icon, Mark, StatusChip, STATUS_LOOK } from '../ui/marks';
 import { useDraft } from '../ui/use_draft';
 import { gate_line } from '../ui/gates';
 import { VERDICT_WORDS } from '../ui/words';
@@ -39,12 +41,14 @@ interface Form {
 }
 
 export function Publish({ mission }: { mission: MissionMsg }) {
-  const [draft, set_draft] = useState<Calibration | null>(null),
+  const [made, set_made] = useState<Calibration | null>(null),
+    [goal, set_goal] = useState<AccuracyGoal | null>(null),
     [moved, set_moved] = useState<ReadonlyMap<string, Moved>>(new Map()),
     [problem, set_problem] = useState(''),
     [busy, set_busy] = useState<'' | 'calibrating' | 'publishing' | 'planning'>('calibrating'),
     [picked, pick] = useState<string | null>(null);
-  const solves = may('engineer');
+  const solves = may('engineer'),
+    draft = made && { ...made, rows: made.rows.map((r) => against_goal(r, goal)) };
   const keys = useRef({ calibrate: idempotency_key(), publish: idempotency_key() }),
     [form, change, forget] = useDraft<Form>(`publish/${mission.mission}`, { note: '', reasons: {}, left: {} }),
     { note, reasons, left } = form,
@@ -64,15 +68,16 @@ export function Publish({ mission }: { mission: MissionMsg }) {
       void guarded('calibrating', async () => {
         // After landing the server has solved the flight by itself: that is what waits for review.
         const there = solves && anew ? null : await newest_calibration(mission.mission);
-        const made =
+        const solved =
           there && (!solves || (there.after_landing && !in_air()))
             ? there
             : solves
               ? await calibrate(mission.mission, keys.current.calibrate, arm_sigma_m)
               : null;
-        if (!made) throw new Error('This flight is not solved yet: an engineer has to calibrate it first.');
-        set_draft(made);
-        set_moved(await moved_since_published(made.id).catch(() => new Map<string, Moved>()));
+        if (!solved) throw new Error('This flight is not solved yet: an engineer has to calibrate it first.');
+        set_made(solved);
+        set_goal(accuracy_goal(await live_rows(mission.mission).catch(() => [])));
+        set_moved(await moved_since_published(solved.id).catch(() => new Map<string, Moved>()));
       }),
   );
   useEffect(() => {
@@ -83,7 +88,8 @@ export function Publish({ mission }: { mission: MissionMsg }) {
     overrides = Object.entries(reasons)
       .filter(([id, reason]) => reason.trim() !== '' && draft?.rows.some((r) => r.anchor === id && may_override(r)))
       .map(([network_id, reason]) => ({ network_id, reason: reason.trim() }));
-  const going = good.length + overrides.length;
+  const going = good.length + overrides.length,
+    n_over = good.filter((r) => r.status === 'over_goal').length;
   const send = (): void =>
     void guarded('publishing', async () => {
       const n = await publish(
@@ -194,6 +200,7 @@ export function Publish({ mission }: { mission: MissionMsg }) {
                     pick={() => pick(r.anchor === picked ? null : r.anchor)}
                     r={r}
                     moved={moved.get(r.anchor)}
+                    over={goal && r.status === 'over_goal' ? over_goal_words(r, goal) : ''}
                     reason={reasons[r.anchor]}
                     set_reason={(reason) => change({ reasons: { ...reasons, [r.anchor]: reason } })}
                     left={left[r.anchor]}
@@ -246,6 +253,11 @@ export function Publish({ mission }: { mission: MissionMsg }) {
             <button class="btn" onClick={() => (publish_open.value = false)}>
               Not now
             </button>
+            {n_over > 0 && (
+              <span class="caution" data-testid="over-goal">
+                {n_over} over the accuracy goal
+              </span>
+            )}
             <button class="btn primary" data-testid="publish-now" disabled={busy !== '' || going === 0} onClick={send}>
               {busy === 'publishing' ? 'Publishing' : `Publish ${going} of ${draft.rows.length} anchors`}
             </button>
@@ -278,6 +290,7 @@ const may_override = (r: AnchorRow): boolean => !passes(r) && r.verdict !== 'amb
 function DraftRow({
   r,
   moved,
+  over,
   picked,
   pick,
   reason,
@@ -289,6 +302,7 @@ function DraftRow({
   picked: boolean;
   pick: () => void;
   moved: Moved | undefined;
+  over: string; ///< which accuracy goal it is over
   reason: string | undefined;
   set_reason: (reason: string) => void;
   left: string | undefined;
@@ -307,6 +321,7 @@ function DraftRow({
       </th>
       <td>
         <StatusChip status={r.status} />
+        {over && <span class="caution block wrap">{over}</span>}
         <span class="mut block wrap">{r.verdict === 'ok' ? '' : r.reason || VERDICT_WORDS[r.verdict]}</span>
       </td>
       <td class="num">{accuracy(r.h95_m)}</td>
@@ -338,7 +353,7 @@ function DraftRow({
           </>
         ) : passes(r) ? (
           <>
-            <Mark shape="ok" tone="ok" /> accepted{' '}
+            <Mark shape={STATUS_LOOK[r.status][0]} tone={STATUS_LOOK[r.status][1]} /> accepted{' '}
             <button class="btn small" data-testid={`leave-${r.anchor}`} onClick={() => leave('')}>
               Reject
             </button>

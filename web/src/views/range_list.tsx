@@ -1,8 +1,9 @@
 import type { VNode } from 'preact';
 import { useEffect, useRef } from 'preact/hooks';
+import type { RangeMsg } from '../live/messages';
 import { chosen_anchor, replayed, watched_mission, watched_scene, now_ms, tick, watched_lost } from '../state/store';
 import { range_class, rate_hz, type RangeRow } from '../state/scene';
-import { age, fixed, range_m } from '../ui/format';
+import { age, fixed, percent, range_m } from '../ui/format';
 import { CLASS_LOOK, Mark, Q } from '../ui/marks';
 import { refused_words } from '../ui/words';
 
@@ -32,6 +33,8 @@ function useInSight(rows: number): ReadonlySet<string> {
   return body;
 }
 
+const is_corrected = (r: RangeMsg): boolean => Math.abs(r.corrected_m - r.distance_m) > 5e-4;
+
 /// One row per anchor, in the order of their ids: a list that re-sorts under the finger cannot be tapped.
 export function RangeList({ selected }: { selected: string | null }) {
   tick.value;
@@ -44,7 +47,9 @@ export function RangeList({ selected }: { selected: string | null }) {
     in_sight = useInSight(rows.length);
   const in_range = rows.filter(([, r]) => now - r.at_ms < STALE_MS).length;
   const total_hz = rows.reduce((s, [, r]) => s + (now - r.at_ms < STALE_MS ? (rate_hz(r) ?? 0) : 0), 0);
-  const modelled = rows.some(([, r]) => r.last.p_los !== null);
+  const modelled = rows.some(([, r]) => r.last.p_los !== null),
+    // Of a stored flight without models there is no class and no correction: "unclear" and "corrected" would claim one.
+    raw = replayed.value !== null && !modelled && !rows.some(([, r]) => is_corrected(r.last));
   return (
     <section class="sec-p ranges" data-testid="range-list">
       <div class="hd">
@@ -70,12 +75,13 @@ export function RangeList({ selected }: { selected: string | null }) {
       ) : (
         <table class="rg">
           <caption class="sr">
-            Live ranges by anchor{modelled ? '' : '. No line-of-sight model is active, so all are unclear.'}
+            {replayed.value ? 'Ranges' : 'Live ranges'} by anchor
+            {modelled ? '' : `. No line-of-sight model is active, so ${raw ? 'none has a class' : 'all are unclear'}.`}
           </caption>
           <thead>
             <tr>
               <th scope="col">Anchor</th>
-              <th scope="col">Corrected</th>
+              <th scope="col">{raw ? 'Raw' : 'Corrected'}</th>
               <th scope="col" class="pl">
                 {modelled ? 'P(LOS)' : 'RSS'}
               </th>
@@ -90,7 +96,7 @@ export function RangeList({ selected }: { selected: string | null }) {
           <tbody>
             {rows.map(([id, r]) => {
               const stale = lost || !running || now - r.at_ms > STALE_MS,
-                look = `${stale} ${running} ${id === selected} ${modelled}`,
+                look = `${stale} ${running} ${id === selected} ${modelled} ${raw}`,
                 says = `${look} ${r.last.t_us} ${stale ? age(now - r.at_ms) : ''}`,
                 before = drawn.get(id);
               if (before?.row === r) {
@@ -108,6 +114,7 @@ export function RangeList({ selected }: { selected: string | null }) {
                   running={running}
                   selected={id === selected}
                   modelled={modelled}
+                  raw={raw}
                 />
               );
               drawn.set(id, { row: r, look, says, at_ms: now, element });
@@ -137,6 +144,7 @@ function Row({
   running,
   selected,
   modelled,
+  raw,
 }: {
   id: string;
   row: RangeRow;
@@ -145,11 +153,12 @@ function Row({
   running: boolean;
   selected: boolean;
   modelled: boolean;
+  raw: boolean;
 }) {
   const cls = range_class(row.last.p_los),
     [shape, tone, word] = CLASS_LOOK[cls];
   const r = row.last,
-    corrected = Math.abs(r.corrected_m - r.distance_m) > 5e-4;
+    corrected = is_corrected(r);
   return (
     <tr
       class={`${stale ? 'stale' : ''}${selected ? ' sel' : ''}`}
@@ -161,10 +170,12 @@ function Row({
         <button class="id" aria-pressed={selected} onClick={() => (chosen_anchor.value = id)}>
           {id}
         </button>
-        <span class={`cl ${stale ? 'off' : r.refused ? 'caution' : tone}`}>
-          <Mark shape={stale ? 'off' : r.refused ? 'caution' : shape} />
-          {stale ? running ? `${age(age_ms)} old` : 'ended' : r.refused ? refused_words(r.refused) : <b>{word}</b>}
-        </span>
+        {(!raw || stale) && (
+          <span class={`cl ${stale ? 'off' : r.refused ? 'caution' : tone}`}>
+            <Mark shape={stale ? 'off' : r.refused ? 'caution' : shape} />
+            {stale ? running ? `${age(age_ms)} old` : 'ended' : r.refused ? refused_words(r.refused) : <b>{word}</b>}
+          </span>
+        )}
       </th>
       <td>
         <span class="d">
@@ -179,7 +190,7 @@ function Row({
       <td class={`pl ${stale ? '' : tone}`}>
         {modelled ? (
           <>
-            <span class="pv">{stale ? '–' : fixed(r.p_los, 2)}</span>
+            <span class="pv">{stale || r.p_los === null ? '–' : `${percent(r.p_los)} %`}</span>
             <span class="prob">
               <i style={{ width: stale || r.p_los === null ? '0' : `${r.p_los * 100}%` }} />
             </span>

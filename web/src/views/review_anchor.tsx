@@ -1,6 +1,7 @@
 /// One anchor of a calibration under review: where it is among the others, why, error budget, residuals, history.
 import type { AnchorRow } from '../api/anchors';
 import { MapBox } from '../map/map_box';
+import { likelier } from '../state/done';
 import { AnchorDetail } from './anchor_detail';
 
 const nothing = (): void => undefined;
@@ -17,14 +18,20 @@ export function ReviewAnchor({
   return (
     <section class="reviewed" aria-label={`Anchor ${row.anchor}`} data-testid="review-anchor">
       <MapBox
-        content={() => ({ anchors: rows, selected: row.anchor, scene: null, link_lost: false, running: false })}
+        content={() => ({
+          anchors: rows.map(likelier),
+          selected: row.anchor,
+          scene: null,
+          link_lost: false,
+          running: false,
+        })}
         onSelect={pick}
         label="Map of the anchors under review"
         follow={false}
         version={row}
         zero="the origin of the calibration"
       />
-      <AnchorDetail row={row} live={false} draft changed={nothing} />
+      <AnchorDetail row={likelier(row)} live={false} draft changed={nothing} />
     </section>
   );
 }

@@ -6,6 +6,7 @@ import type { AnchorRow } from '../../api/anchors';
 import { num, obj, type EstimateMsg, type FixClass, type MissionMsg, type Vec3 } from '../../live/messages';
 import { enu_from_geodetic, type Geodetic } from '../../map/enu';
 import type { Content } from '../../map/picture';
+import { likelier } from '../../state/done';
 import { Scene } from '../../state/scene';
 import { ground_of } from '../flight/picture';
 import { to_m } from './draft';
@@ -146,13 +147,15 @@ export function plan_content(
     anchors.set(r.anchor, { ...r, enu_m: [e, n, r.h_m - near!.ground_h_m], mirror: null });
   }
   // What the flight finds is newer than what is published.
-  for (const { value: a } of (near && scene?.anchors.values()) ?? [])
+  for (const { value } of (near && scene?.anchors.values()) ?? []) {
+    const a = likelier(value);
     if (a.enu_m && a.v95_m !== null && a.v95_m < KNOWN_M)
       anchors.set(a.anchor, {
         ...a,
         enu_m: plus(a.enu_m, near!.shift),
         mirror: a.mirror?.enu_m ? { ...a.mirror, enu_m: plus(a.mirror.enu_m, near!.shift) } : null,
       });
+  }
   return {
     anchors: [...anchors.values()],
     selected: null,

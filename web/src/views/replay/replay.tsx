@@ -2,10 +2,10 @@
 import { useEffect, useRef, useState } from 'preact/hooks';
 import './replay.css';
 import { error_text } from '../../api/client';
-import { rows_of_collection } from '../../api/anchors';
-import { request } from '../../api/client';
+import { live_rows } from '../../api/anchors';
 import { MapBox } from '../../map/map_box';
 import { after, estimates_over_time, load_recording, neighbour, Player } from '../../state/recording';
+import { shown_estimates } from '../../state/done';
 import { alarms_at, procedure_at, status_of } from '../../state/moment';
 import { chosen_anchor, mission_id, now_ms, ordered_missions, replayed, synced, tick } from '../../state/store';
 import { clock, fixed, told_apart } from '../../ui/format';
@@ -18,15 +18,6 @@ import { RangeList } from '../range_list';
 import { useStable } from '../../ui/use_stable';
 
 const SPEEDS = [0.25, 0.5, 1, 2, 4, 8, 16] as const;
-
-/// What the whole flight gave.
-const whole = (mission: string) =>
-  request('GET', `/anchors?view=live&mission=${encodeURIComponent(mission)}&limit=1000`)
-    .then(rows_of_collection)
-    .then(
-      ({ rows }) => rows,
-      () => [],
-    );
 
 export function Replay({ id }: { id: string | null }) {
   const [at_s] = useState(() => Number(new URLSearchParams(location.hash.split('?')[1] ?? '').get('t')) || 0);
@@ -61,7 +52,7 @@ export function Replay({ id }: { id: string | null }) {
         if (gone) return;
         if (over_time) made.learn(over_time, now_ms());
         else
-          for (const r of await whole(mission.mission))
+          for (const r of await live_rows(mission.mission).catch(() => []))
             made.scene.add_estimate({ ...r, mission: mission.mission, t_us: recording.to_us }, now_ms());
         show(made);
         set_moment(over_time ? 'moment' : 'whole');
@@ -196,7 +187,7 @@ export function Replay({ id }: { id: string | null }) {
       <div class="replaybody">
         <MapBox
           content={() => ({
-            anchors: scene ? [...scene.anchors.values()].map((a) => a.value) : [],
+            anchors: shown_estimates(scene),
             selected,
             scene: player?.scene ?? null,
             link_lost: false,
