@@ -132,10 +132,8 @@ std::string sentence(const char* format, double a, double b = 0, double c = 0) {
   return text;
 }
 
-/// How well the arm is known: what the run says, else the mission. Where nobody said how the tag hangs and no
-/// heading could show it, the regions hold where it may be.
+/// Where nobody said how the tag hangs and no heading could show it, the regions hold where it may be.
 void set_arm_sigma(const FlightData& flight, Work& work) {
-  if (!work.options.lever_arm_sigma_m) work.options.lever_arm_sigma_m = flight.mission.lever_arm_sigma_m;
   if (!flight.mission.tags.empty() || work.rows.point == TrackPoint::tag_antenna ||
       work.rows.track.has_attitude() || work.options.lever_arm_sigma_m)
     return;

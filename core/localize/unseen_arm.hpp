@@ -7,6 +7,10 @@
 
 namespace anchord {
 
+/// One sigma of the forward and left part of an arm that nobody declared: nearly every tag is mounted within
+/// 0.3 m of the track point (0.02 to 0.49 m on the aircraft seen so far).
+inline constexpr double k_undeclared_arm_sigma_m = 0.15;
+
 /// Widens the positions of a fit by the declared uncertainty of the lever arm's forward and left part
 /// (FlightOptions::lever_arm_sigma_m), along the way everything follows the arm; of a track without attitude
 /// in the plane, for an arm whose bearing is not known moves an anchor by its own length at most. Nothing

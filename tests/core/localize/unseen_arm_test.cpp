@@ -213,20 +213,6 @@ TEST(UnseenArm, IsNoSmallerForASigmaWhereTheArmIsNotApplied) {
   }
 }
 
-// Said once with the mission, so that no run has to be told.
-TEST(UnseenArm, IsHeldByASigmaOfTheMissionUnlessTheRunHasItsOwn) {
-  FlightData flight = make_flight(MadeFlight{});
-  FlightOptions own;
-  own.lever_arm_sigma_m = 0.15;
-  const double by_run_m = solved(flight, own).anchors[0].estimate.h95_m;
-  flight.mission.lever_arm_sigma_m = 0.15;
-  const FlightSolution by_mission = solved(flight);
-  EXPECT_EQ(by_mission.anchors[0].estimate.h95_m, by_run_m);
-  EXPECT_EQ(unseen(by_mission.anchors[0]), nullptr);
-  own.lever_arm_sigma_m = 0.02;
-  EXPECT_LT(solved(flight, own).anchors[0].estimate.h95_m, by_run_m);
-}
-
 TEST(UnseenArm, RefusesASigmaThatIsNone) {
   for (const double sigma_m : {0.0, -0.1, std::nan("")}) {
     FlightOptions options;
