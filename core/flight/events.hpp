@@ -54,7 +54,8 @@ struct OriginMoved {};
 using Event = std::variant<FixBelieved, FixShown, PoseMoved, RangeDecided, AnchorFound, AnchorStatusChanged,
                            AnchorEstimated, FixRejected, OriginMoved>;
 
-/// found (no position yet), estimating, ambiguous or converged: verdict ok, and within the accuracy goal.
+/// found (no position yet), estimating, ambiguous or converged: within the accuracy goal, and no gate holds
+/// it back (reached_goal).
 std::string_view anchor_status(const Estimate& estimate);
 
 }  // namespace anchord::flight

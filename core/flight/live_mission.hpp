@@ -32,7 +32,7 @@ namespace anchord::flight {
 struct LiveMissionSetup {
   Mission mission;
   LiveOptions live{};
-  AccuracyGoal goal{};  ///< an anchor within it is converged
+  AccuracyGoal goal{};  ///< an anchor within it that no gate holds back is converged
   std::vector<Exclusion> exclusions{};
   procedure::FlightPriors priors{};  ///< what turns and height searches found before
 };

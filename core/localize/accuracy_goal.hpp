@@ -17,10 +17,11 @@ struct AccuracyGoal {
 inline constexpr const char* k_goal_h95 = "goal_h95_m";
 inline constexpr const char* k_goal_v95 = "goal_v95_m";
 
+inline bool is_goal(const Gate& gate) { return gate.name == k_goal_h95 || gate.name == k_goal_v95; }
+
 /// Puts the two gates of the goal last among the estimate's gates, in place of older ones.
 inline void assess_goal(Estimate& estimate, const AccuracyGoal& goal) {
-  std::erase_if(estimate.gates,
-                [](const Gate& gate) { return gate.name == k_goal_h95 || gate.name == k_goal_v95; });
+  std::erase_if(estimate.gates, is_goal);
   const auto add = [&](const char* name, double value, double limit) {
     Gate gate;
     gate.name = name;
@@ -34,12 +35,19 @@ inline void assess_goal(Estimate& estimate, const AccuracyGoal& goal) {
   add(k_goal_v95, estimate.v95_m, goal.v95_m);
 }
 
-/// Verdict ok and both bounds within the goal; false where the goal was never judged.
+/// The first gate that holds the position back whatever its accuracy; none: nullptr.
+inline const Gate* holding_back(const Estimate& estimate) {
+  const auto at =
+      std::ranges::find_if(estimate.gates, [](const Gate& gate) { return !gate.passed && !is_goal(gate); });
+  return at == estimate.gates.end() ? nullptr : &*at;
+}
+
+/// Within the goal, and fit to be accepted: verdict ok and every gate passed. False where the goal was never
+/// judged, and where the gates were not asked yet, which takes a joint solution of the flight: an accurate
+/// answer may be a wrong one.
 inline bool reached_goal(const Estimate& estimate) {
-  if (estimate.verdict != Verdict::ok || !estimate.best) return false;
-  return std::count_if(estimate.gates.begin(), estimate.gates.end(), [](const Gate& gate) {
-           return gate.passed && (gate.name == k_goal_h95 || gate.name == k_goal_v95);
-         }) == 2;
+  return estimate.acceptable() && std::ranges::count_if(estimate.gates, is_goal) == 2 &&
+         estimate.gates.size() > 2;
 }
 
 }  // namespace anchord

@@ -126,6 +126,26 @@ std::vector<ProfileFactor> others_of(const std::vector<Work>& all, std::size_t i
   return factors;
 }
 
+std::string sentence(const char* format, double a, double b = 0, double c = 0) {
+  char text[400];
+  std::snprintf(text, sizeof text, format, a, b, c);
+  return text;
+}
+
+/// Where nobody said how the tag hangs and no heading could show it, the regions hold where it may be.
+void set_arm_sigma(const FlightData& flight, Work& work) {
+  if (!flight.mission.tags.empty() || work.rows.point == TrackPoint::tag_antenna ||
+      work.rows.track.has_attitude() || work.options.lever_arm_sigma_m)
+    return;
+  work.options.lever_arm_sigma_m = k_undeclared_arm_sigma_m;
+  work.rows.notes.push_back(
+      sentence("the track has no attitude and no lever arm is declared: a tag %.1f m beside the track point "
+               "would move every anchor by up to %.1f m, and no range would show it, so the regions hold "
+               "%.2f m (one sigma) for it: declare the lever arm, zeros too, or how well it is known "
+               "(lever_arm_sigma_m)",
+               k_arm_asked_m, k_arm_asked_m, k_undeclared_arm_sigma_m));
+}
+
 /// What of the given knowledge about the kit was not used, for people.
 void note_unused(std::vector<Work>& all, const FlightOptions& options) {
   for (std::size_t i = 0; i < all.size(); ++i) {
@@ -140,12 +160,6 @@ void note_unused(std::vector<Work>& all, const FlightOptions& options) {
                                 work.kit + "': not used");
     }
   }
-}
-
-std::string sentence(const char* format, double a, double b, double c) {
-  char text[260];
-  std::snprintf(text, sizeof text, format, a, b, c);
-  return text;
 }
 
 std::size_t n_believed(const FlightRows& flight) {
@@ -288,6 +302,7 @@ Result<std::vector<FlightSolution>> solve_flights(std::span<const FlightData* co
     if (!rows) return make_error(rows.error().code, flight->mission.name + ": " + rows.error().message);
     Work work{.rows = std::move(rows.value())};
     work.options = in_frame_of(work.rows, options);
+    set_arm_sigma(*flight, work);
     work.kit = flight->mission.kit;
     work.name = flight->mission.name;
     work.digest = flight_digest(*flight);
@@ -338,7 +353,7 @@ Result<std::vector<FlightSolution>> solve_flights(std::span<const FlightData* co
     Work& work = all[i];
     BOOST_OUTCOME_TRY(const auto arm, check_lever_arm(work.rows, work.fit, work.prior, work.options));
     if (arm) work.checks.push_back(*arm);
-    add_arm_doubt(work.prior, work.options, work.fit);
+    add_arm_doubt(work.rows, work.prior, work.options, work.fit);
     work.unseen_arm = unseen_arm_gates(work.rows, work.fit, work.prior, work.options);
     if (work.rows.step_share > 0) work.checks.push_back(check_steps(work.rows.step_share, options));
     const auto others = others_of(all, i, options);

@@ -108,12 +108,17 @@ std::string why(const Reach& worst, double unapplied) {
 
 }  // namespace
 
-void add_arm_doubt(const SharedPrior& prior, const FlightOptions& options, JointFit& fit) {
+void add_arm_doubt(const FlightRows& flight, const SharedPrior& prior, const FlightOptions& options,
+                   JointFit& fit) {
   if (!options.lever_arm_sigma_m) return;
   const ArmResponse arm = response_of(fit, prior);
   const double variance_m2 = *options.lever_arm_sigma_m * *options.lever_arm_sigma_m;
+  const Eigen::Matrix4d in_plane = Eigen::Vector4d(1, 1, 0, 0).asDiagonal();
   for (std::size_t i = 0; i < fit.anchor_covariance.size(); ++i) {
-    const Eigen::Matrix4d arm_m2 = variance_m2 * arm.anchors[i] * arm.anchors[i].transpose();
+    const Eigen::Matrix4d arm_m2 =
+        variance_m2 * (flight.track.has_attitude()
+                           ? Eigen::Matrix4d(arm.anchors[i] * arm.anchors[i].transpose())
+                           : in_plane);
     fit.anchor_covariance[i] += arm_m2;
     fit.arm_covariance_m2.emplace_back(arm_m2.topLeftCorner<3, 3>());
   }
@@ -121,12 +126,11 @@ void add_arm_doubt(const SharedPrior& prior, const FlightOptions& options, Joint
 
 std::vector<Gate> unseen_arm_gates(const FlightRows& flight, const JointFit& fit, const SharedPrior& prior,
                                    const FlightOptions& options) {
-  if (options.lever_across_prior_m > 0 || options.lever_arm_sigma_m ||
-      flight.point == TrackPoint::tag_antenna)
-    return {};
-  const ArmResponse arm = response_of(fit, prior);
+  if (options.lever_across_prior_m > 0 || flight.point == TrackPoint::tag_antenna) return {};
   const double unapplied = flight.track.has_attitude() ? 0.0 : unapplied_m(flight);
-  if (!flight.track.has_attitude() && unapplied <= 0) return {};
+  // How well an arm is measured says nothing of one that is not applied.
+  if (unapplied <= 0 && (options.lever_arm_sigma_m || !flight.track.has_attitude())) return {};
+  const ArmResponse arm = response_of(fit, prior);
   std::vector<Gate> gates;
   for (std::size_t i = 0; i < flight.anchors.size(); ++i) {
     Eigen::Matrix3d covariance_m2 = fit.anchor_covariance[i].topLeftCorner<3, 3>();

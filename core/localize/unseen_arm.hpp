@@ -7,12 +7,18 @@
 
 namespace anchord {
 
+/// One sigma of the forward and left part of an arm that nobody declared: nearly every tag is mounted within
+/// 0.3 m of the track point (0.02 to 0.49 m on the aircraft seen so far).
+inline constexpr double k_undeclared_arm_sigma_m = 0.15;
+
 /// Widens the positions of a fit by the declared uncertainty of the lever arm's forward and left part
-/// (FlightOptions::lever_arm_sigma_m), along the way everything follows the arm. Nothing where none is
-/// declared: a centimetre or two of a tape measure is in the floor.
+/// (FlightOptions::lever_arm_sigma_m), along the way everything follows the arm; of a track without attitude
+/// in the plane, for an arm whose bearing is not known moves an anchor by its own length at most. Nothing
+/// where none is declared: a centimetre or two of a tape measure is in the floor.
 /// prior  what the fit was solved with
 /// fit    its anchor_covariance and arm_covariance_m2 grow
-void add_arm_doubt(const SharedPrior& prior, const FlightOptions& options, JointFit& fit);
+void add_arm_doubt(const FlightRows& flight, const SharedPrior& prior, const FlightOptions& options,
+                   JointFit& fit);
 
 /// How far each anchor would move by an error of the declared lever arm that the flight does not show: the
 /// external reliability of the arm (Baarda 1968). Of errors up to 0.3 m (a wrong entry in a form) in any
@@ -28,7 +34,7 @@ void add_arm_doubt(const SharedPrior& prior, const FlightOptions& options, Joint
 /// course 294.
 ///
 /// returns  gate unseen_arm of each anchor, in metres; nothing where the arm is estimated, where its
-///          uncertainty is declared, or where the track is the tag's own
+///          uncertainty is declared and the whole arm applied, or where the track is the tag's own
 std::vector<Gate> unseen_arm_gates(const FlightRows& flight, const JointFit& fit, const SharedPrior& prior,
                                    const FlightOptions& options);
 

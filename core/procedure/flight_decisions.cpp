@@ -2,6 +2,7 @@
 #include <cmath>
 #include <utility>
 
+#include "core/localize/accuracy_goal.hpp"
 #include "core/procedure/flight_engine.hpp"
 #include "core/procedure/why_not_done.hpp"
 
@@ -40,7 +41,7 @@ void FlightEngine::assess_anchors(double now_s, std::span<const Estimate> estima
     progress.iterations = task.iterations;
     progress.battery = vehicle_.battery;
     progress.elapsed_s = now_s - started_s_.value_or(now_s);
-    if (estimate && estimate->verdict == Verdict::ok) {
+    if (estimate && estimate->verdict == Verdict::ok && holding_back(*estimate) == nullptr) {
       progress.sigma_m = position_sigma_m(*estimate);
       progress.gdop_root = estimate->gdop;
     }

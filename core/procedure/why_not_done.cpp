@@ -7,6 +7,8 @@
 #include <numbers>
 #include <vector>
 
+#include "core/localize/accuracy_goal.hpp"
+
 namespace anchord::procedure {
 namespace {
 
@@ -72,6 +74,7 @@ std::string why_not_done(const std::optional<Estimate>& estimate, std::span<cons
   }
   if (estimate->verdict != Verdict::ok)
     return estimate->reason.empty() ? "not assessed as ok yet" : estimate->reason;
+  if (const Gate* gate = holding_back(*estimate)) return gate->why;
   return "more points wanted";
 }
 

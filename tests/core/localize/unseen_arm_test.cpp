@@ -157,6 +157,62 @@ TEST(UnseenArm, IsTheArmItselfWhereTheTrackHasNoHeading) {
   }
 }
 
+bool notes_no_arm(const FlightSolution& solution) {
+  return std::ranges::any_of(solution.notes, [](const std::string& note) {
+    return note.find("no lever arm is declared") != std::string::npos &&
+           note.find("up to 0.3 m") != std::string::npos;
+  });
+}
+
+// Flown with the tag 0.3 m beside the track point, and nobody wrote it down.
+TEST(UnseenArm, IsToldAndHeldByTheRegionsWhereNeitherHeadingNorArmIsKnown) {
+  for (const double turn_rate_radps : {0.0, 0.05, 0.3}) {
+    MadeFlight made;
+    made.arm_error_m = {0.18, -0.24, 0};
+    made.turn_rate_radps = turn_rate_radps;
+    FlightData flight = make_flight(made);
+    flight.mission.tags.clear();
+    for (Fix& fix : flight.fixes) fix.enu_from_body.reset();
+    const FlightSolution solution = solved(flight);
+    EXPECT_TRUE(notes_no_arm(solution));
+    flight.mission.tags = {{NetworkId{0x6e01}, 0, {0, 0, 0}}};
+    const FlightSolution declared = solved(flight);
+    EXPECT_FALSE(notes_no_arm(declared)) << "zeros are a declaration";
+    for (std::size_t i = 0; i < made.anchors.size(); ++i) {
+      const Estimate& estimate = solution.anchors[i].estimate;
+      const Eigen::Matrix3d more_m2 =
+          estimate.best->covariance_m2 - declared.anchors[i].estimate.best->covariance_m2;
+      Eigen::Matrix3d expected_m2 = Eigen::Matrix3d::Zero();
+      expected_m2(0, 0) = expected_m2(1, 1) = 0.15 * 0.15;  // 0.3 m is two sigma
+      EXPECT_NEAR((more_m2 - expected_m2).norm(), 0, 1e-9);
+      const Eigen::Vector3d off = estimate.best->position.m - made.anchors[i];
+      EXPECT_LT(off.dot(estimate.best->covariance_m2.inverse() * off), 7.815) << turn_rate_radps << ' ' << i;
+    }
+  }
+}
+
+TEST(UnseenArm, OfTheTrackPointItselfIsNoQuestionWithoutAnArm) {
+  FlightData flight = make_flight(MadeFlight{});
+  flight.mission.tags.clear();
+  for (Fix& fix : flight.fixes) fix.enu_from_body.reset();
+  flight.mission.point = TrackPoint::tag_antenna;
+  EXPECT_FALSE(notes_no_arm(solved(flight)));
+}
+
+// An arm that is measured to 2 cm and not applied is wrong by its whole length.
+TEST(UnseenArm, IsNoSmallerForASigmaWhereTheArmIsNotApplied) {
+  FlightData flight = make_flight(MadeFlight{});
+  for (Fix& fix : flight.fixes) fix.enu_from_body.reset();
+  for (TagAntenna& tag : flight.mission.tags) tag.lever_arm_body_m = {0.3, 0.4, 0};
+  FlightOptions options;
+  options.lever_arm_sigma_m = 0.02;
+  for (const auto& anchor : solved(flight, options).anchors) {
+    ASSERT_NE(unseen(anchor), nullptr);
+    EXPECT_NEAR(unseen(anchor)->value.value(), 0.5, 1e-6);
+    EXPECT_FALSE(anchor.estimate.acceptable());
+  }
+}
+
 TEST(UnseenArm, RefusesASigmaThatIsNone) {
   for (const double sigma_m : {0.0, -0.1, std::nan("")}) {
     FlightOptions options;

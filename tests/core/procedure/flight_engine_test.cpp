@@ -10,6 +10,8 @@
 #include <tuple>
 #include <utility>
 
+#include "core/localize/accuracy_goal.hpp"
+
 namespace anchord::procedure {
 namespace {
 
@@ -515,6 +517,29 @@ TEST(FlightEngine, AnAnchorIsDoneAtItsOwnTargetWhereItHasOne) {
     const char* const wanted =
         own_m ? "accuracy reached: 0.040 m, wanted 0.060 m" : "accuracy reached: 0.040 m, wanted 0.050 m";
     EXPECT_EQ(task.why == wanted, reached) << task.why;
+  }
+}
+
+TEST(FlightEngine, AnAnchorIsNotDoneWhileAGateHoldsItBack) {
+  Estimate estimate;
+  estimate.anchor = k_anchor;
+  estimate.verdict = Verdict::ok;
+  estimate.best.emplace();
+  estimate.best->position.m = k_place + Vector3d(3, 2, 0);
+  estimate.best->covariance_m2 = Eigen::Matrix3d::Identity() * 1e-4;
+  for (const bool passed : {true, false}) {
+    estimate.gates = {{"residual_scale", 0.7, 0.6, passed, "1.4826 x median absolute residual, metres"},
+                      {k_goal_h95, 0.3, 0.2, false, ""}};  // the flight has a target of its own
+    auto given = setup();
+    given.exit.min_iterations = 1;
+    given.exit.target_sigma_m = 0.05;
+    Flown f(std::move(given));
+    ways().at(Step::ranging)(f);
+    f.hear();
+    f.feed({Trigger::sampled});
+    f.here();
+    f.engine.tick(f.now, std::vector{estimate});
+    EXPECT_EQ(f.engine.state().anchors[0].reached, passed) << f.engine.state().anchors[0].why;
   }
 }
 

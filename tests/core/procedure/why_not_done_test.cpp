@@ -44,6 +44,11 @@ TEST(WhyNotDone, NamesTheFirstCauseWithItsNumbers) {
   biased.bias_sigma_m = 0.3;
   EXPECT_EQ(why(biased), "bias and position cannot be distinguished: bias known to 0.30 m");
   EXPECT_EQ(why(good()), "accuracy 0.300 m, wanted 0.050 m");
+  auto held = good();
+  held.best->covariance_m2 *= 0.01;
+  EXPECT_EQ(why(held), "more points wanted");
+  held.gates = {{"redundancy", 90, 30, true, ""}, {"halves", 40, 16, false, "the halves disagree"}};
+  EXPECT_EQ(why(held), "the halves disagree");
 }
 
 }  // namespace

@@ -68,6 +68,8 @@ const WORDS: Record<string, Words> = {
     unit: 'm',
   },
 };
+/// Whether it is accurate enough; every other gate asks whether it is right.
+export const is_goal = (g: Gate): boolean => g.name.startsWith('goal_');
 const plain_name = (name: string): string => name.replaceAll('_', ' ').replace(/^./, (c) => c.toUpperCase());
 
 /// What the gate found, as a statement that is true as it stands: a failed gate never reads "halves agree".

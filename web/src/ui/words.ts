@@ -1,6 +1,6 @@
 /// Everything the page says about verdicts and reasons, in one place. No DOM.
 import type { AnchorStatus, EstimateMsg, Verdict } from '../live/messages';
-import { gate_line } from './gates';
+import { gate_line, is_goal } from './gates';
 
 export const VERDICT_WORDS: Record<Verdict, string> = {
   ok: 'well determined',
@@ -32,7 +32,11 @@ export function why_not_done(e: EstimateMsg, task = ''): { title: string; text: 
       text: sentence(task) || 'Fly again for the anchors that lack something.',
     };
   const open = e.gates.filter((g) => !g.passed),
-    text = sentence(e.reason || task || (e.verdict === 'ok' && open.length ? gate_line(open[0]!) : ''));
+    holding = e.verdict === 'ok' ? open.find((g) => !is_goal(g)) : undefined,
+    text = holding
+      ? `${sentence(gate_line(holding))} ${sentence(holding.why)}`
+      : sentence(e.reason || task || (e.verdict === 'ok' && open.length ? gate_line(open[0]!) : ''));
+  if (holding) return { title: 'Why not done: an acceptance gate holds it back', text: text.trim() };
   // A mirror above or below is separated by height, one beside by leaving the line.
   const level =
     e.mirror?.enu_m && e.enu_m && Math.hypot(e.mirror.enu_m[0] - e.enu_m[0], e.mirror.enu_m[1] - e.enu_m[1]) < 1;
