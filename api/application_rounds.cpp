@@ -98,6 +98,7 @@ void Application::State::publish_system(UtcTime now, ServerPulse& pulse) {
   hub.publish(Topic::system, std::move(json), now.us());
   pulse.writable = storage.writable;
   pulse.reason = storage.reason;
+  pulse.stalled = storage.stalled;
   pulse.disk_free_bytes = storage.disk_free_bytes;
   pulse.queued_rows = storage.queue_depth + missions.queued();
 }

@@ -61,6 +61,13 @@ std::vector<AlarmCondition> alarm_conditions(const std::vector<FlightPulse>& fli
                                              const ServerPulse& server) {
   std::vector<AlarmCondition> out;
   if (!server.writable) out.push_back({"storage.unwritable", AlarmPriority::critical, server.reason, {}});
+  if (server.stalled) {
+    out.push_back(
+        {"storage.stalled",
+         AlarmPriority::critical,
+         server.reason + ". Rows of devices wait in memory and are in the recording; the flight goes on",
+         {}});
+  }
   if (server.disk_free_bytes > 0 && server.disk_free_bytes < k_low_bytes) {
     out.push_back({"disk.low",
                    AlarmPriority::warning,

@@ -30,6 +30,7 @@ struct AlarmCondition {
 struct ServerPulse {
   bool writable{true};
   std::string reason{};
+  bool stalled{false};              ///< a write has been under way for seconds; reason says how long
   std::uint64_t disk_free_bytes{};  ///< 0: not known
   std::uint64_t queued_rows{};      ///< wait for the writer or for the live path
   std::string clock_skew{};         ///< the system clock against the receiver's, in words; empty: right

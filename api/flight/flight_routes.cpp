@@ -91,6 +91,16 @@ Response who_has_control(FlightApi& s, const Request& request) {
   return json_response(200, lease ? lease_json(*lease, false) : Ordered{{"held", false}});
 }
 
+/// The plan that a command's body names; none: refuse_if_any tells.
+std::optional<PlanId> plan_of(Fields& fields) {
+  const auto text = fields.text("plan", 36, true);
+  if (!text) return std::nullopt;
+  const auto id = parse_uuid(*text);
+  if (id) return PlanId{id.value()};
+  fields.error("plan", "bad_id", id.error().message);
+  return std::nullopt;
+}
+
 Response checklist(FlightApi& s, const Request& request) {
   check_query(request, {"plan"});
   const auto mission = named_mission(s.missions, request).id;
@@ -100,7 +110,21 @@ Response checklist(FlightApi& s, const Request& request) {
     if (!id) throw_problem(422, "validation", "plan is no id", {{"/plan", "bad_id", id.error().message}});
     plan = PlanId{id.value()};
   }
-  return json_response(200, checklist_json(s.flights.checklist(mission, plan, request.principal)));
+  return json_response(200, checklist_json(s.flights.checklist(mission, plan)));
+}
+
+Response work_off_checklist(FlightApi& s, const Request& request) {
+  check_query(request, {});
+  const auto mission = named_mission(s.missions, request).id;
+  std::vector<FieldError> errors;
+  const auto body = json_body(request);
+  Fields fields(body, "", errors);
+  const auto plan = plan_of(fields);
+  fields.finish();
+  refuse_if_any(errors);
+  value_or_problem(s.flights.prepare(mission, *plan));
+  s.audit.soon(request, "checklist " + to_string(mission) + " plan " + to_string(*plan));
+  return json_response(200, checklist_json(s.flights.checklist(mission, *plan)));
 }
 
 Response override_item(FlightApi& s, const Request& request) {
@@ -115,7 +139,7 @@ Response override_item(FlightApi& s, const Request& request) {
   refuse_if_any(errors);
   value_or_problem(s.flights.override_item(mission, item, *reason, request.principal));
   s.audit(request, "checklist." + item + ' ' + to_string(mission) + ": " + *reason);
-  return json_response(200, checklist_json(s.flights.checklist(mission, std::nullopt, request.principal)));
+  return json_response(200, checklist_json(s.flights.checklist(mission, std::nullopt)));
 }
 
 Response shown(FlightApi& s, const Request& request, std::string (FlightService::*text)(const MissionId&)) {
@@ -149,13 +173,7 @@ Response act_in_flight(FlightApi& s, const Request& request, const std::string& 
   order.action = value_or_problem(flight::k_flight_action_words.parse("action", word));
   order.lease = fields.text("lease", 64).value_or("");
   if (order.action == flight::FlightAction::start) {
-    if (const auto text = fields.text("plan", 36, true)) {
-      const auto id = parse_uuid(*text);
-      if (id)
-        order.plan = PlanId{id.value()};
-      else
-        fields.error("plan", "bad_id", id.error().message);
-    }
+    order.plan = plan_of(fields);
     order.manual = fields.word("mode", flight::k_flight_mode_words).value_or(false);
   }
   fields.finish();
@@ -181,19 +199,12 @@ Response upload(FlightApi& s, const Request& request) {
   Fields fields(body, "", errors);
   const auto what = fields.word("what", k_lists, true);
   const auto lease = fields.text("lease", 64).value_or("");
-  PlanId plan{};
-  if (const auto text = fields.text("plan", 36, true)) {
-    const auto id = parse_uuid(*text);
-    if (id)
-      plan = PlanId{id.value()};
-    else
-      fields.error("plan", "bad_id", id.error().message);
-  }
+  const auto plan = plan_of(fields);
   fields.finish();
   refuse_if_any(errors);
   const std::string& list = *what;
   const std::string audited = "mission.upload " + list + ' ' + to_string(mission);
-  auto command = s.flights.upload(mission, list, plan, lease, request.principal);
+  auto command = s.flights.upload(mission, list, *plan, lease, request.principal);
   if (!command) {
     s.audit(request, audited, "refused: " + command.error().message);
     if (command.error().code == Errc::invalid_argument) throw_problem(422, "state", command.error().message);
@@ -257,6 +268,8 @@ void add_flight_routes(Router& router, FlightApi& s) {
   router.add(
       keeps_always(as_flight({Method::post, base + "aircraft", op, on(change_aircraft), k_command_bytes})));
   router.add(as_flight({Method::get, base + "checklist", readers(), on(checklist)}));
+  router.add(keeps_always(
+      as_flight({Method::post, base + "checklist", op, on(work_off_checklist), k_command_bytes})));
   router.add(keeps_always(
       as_flight({Method::post, base + "checklist/{item}", op, on(override_item), k_command_bytes})));
   router.add({Method::get, base + "procedure", readers(),

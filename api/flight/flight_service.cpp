@@ -310,8 +310,7 @@ FlightCommand FlightService::settled(FlightCommand command, double wait_s) {
 }
 
 std::vector<ChecklistItem> FlightService::checklist(const MissionId& mission,
-                                                    const std::optional<PlanId>& plan_id,
-                                                    const Principal& who) {
+                                                    const std::optional<PlanId>& plan_id) {
   const auto record = state_->deps.missions.mission(mission);
   std::optional<Plan> plan;
   if (plan_id) {
@@ -320,9 +319,17 @@ std::vector<ChecklistItem> FlightService::checklist(const MissionId& mission,
   }
   const auto ground = state_->groundwork(plan ? &*plan : nullptr);
   auto w = state_->work.lock();
-  if (plan && (who.has(Role::op) || who.has(Role::admin))) w->operations.prepare(mission, *plan);
   return w->operations.checklist(state_->now(), record ? &record.value() : nullptr, mission, ground,
                                  state_->deps.drone == nullptr);
+}
+
+Result<void> FlightService::prepare(const MissionId& mission, const PlanId& plan_id) {
+  BOOST_OUTCOME_TRY(const auto stored, state_->deps.plans.plan(plan_id));
+  Plan plan = plan_of(stored);
+  BOOST_OUTCOME_TRYV(state_->deps.structures.join(plan));
+  auto w = state_->work.lock();
+  w->operations.prepare(mission, plan);
+  return boost::outcome_v2::success();
 }
 
 Result<void> FlightService::override_item(const MissionId& mission, const std::string& item,

@@ -146,9 +146,12 @@ class FlightService final : public MissionObserver, public MissionControl {
   Result<DroneStatus> change_aircraft(const MissionId& mission, const std::string& lease,
                                       const std::string& sender, const Principal& who);
 
-  /// An operator who looks while nobody else has control means to fly: the aircraft gets the plan's fence.
-  std::vector<ChecklistItem> checklist(const MissionId& mission, const std::optional<PlanId>& plan,
-                                       const Principal& who);
+  /// What must be green before Start; sends nothing.
+  std::vector<ChecklistItem> checklist(const MissionId& mission, const std::optional<PlanId>& plan);
+  /// This plan is to be flown: the aircraft gets its fence, as soon as it is there and on the ground, unless
+  /// somebody has control of another mission.
+  /// errors  not_found: no such plan; what joining its structures says
+  Result<void> prepare(const MissionId& mission, const PlanId& plan);
   /// A manual item is confirmed, an automatic one overridden; the reason is kept with the name.
   Result<void> override_item(const MissionId& mission, const std::string& item, const std::string& reason,
                              const Principal& who);

@@ -8,7 +8,8 @@ namespace anchord::api {
 /// State of storage as the world may know it.
 struct StorageStatus {
   bool writable{true};
-  std::string reason;  ///< why not, in words
+  std::string reason;   ///< why not, in words
+  bool stalled{false};  ///< a write has been under way for seconds; reason says how long
   std::uint64_t db_bytes{0}, disk_free_bytes{0}, queue_depth{0};
   std::string synchronous{"full"};
 };

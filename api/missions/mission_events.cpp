@@ -11,7 +11,11 @@ void MissionService::State::publish_events(Flight& flight, Flight::Work& work) {
     std::visit([&](const auto& one) { publish(flight, one); }, event);
 }
 
-void MissionService::State::publish(Flight&, const flight::FixBelieved& event) {
+void MissionService::State::publish(Flight& flight, const flight::FixBelieved& event) {
+  {
+    auto inbox = flight.inbox.lock();
+    inbox->believed = event.fix;
+  }
   if (auto* pilot = observer.load()) pilot->on_fix(event.fix);
 }
 

@@ -39,6 +39,17 @@ void MissionService::State::enqueue(Flight& flight, const R& row, SteadyTime now
   ++queued;
 }
 
+void MissionService::State::tell_pilot(Flight& flight, const Fix& fix) const {
+  auto* pilot = observer.load();
+  if (pilot == nullptr) return;
+  {
+    auto inbox = flight.inbox.lock();
+    if (!inbox->fix_check || !inbox->fix_check->believes(fix)) return;
+    inbox->believed = fix;
+  }
+  pilot->on_fix(fix);
+}
+
 template <class R>
 void MissionService::State::take_newest(std::span<const R> rows) {
   const SteadyTime now = steady_now();
@@ -47,7 +58,10 @@ void MissionService::State::take_newest(std::span<const R> rows) {
     if (!flight || flight->id != row.mission) flight = find(row.mission);
     if (!flight) continue;
     // While it is read back from the store its newest row is not known.
-    if (flight->rebuilding) continue;
+    if (flight->rebuilding) {
+      tell_pilot(*flight, row);
+      continue;
+    }
     if (auto inbox = flight->inbox.lock(); !inbox->ahead.take(row)) continue;
     enqueue(*flight, row, now);
   }
@@ -64,6 +78,7 @@ void MissionService::State::accept(std::span<const R> rows, std::span<const RowO
     if (outcomes[i] != RowOutcome::accepted) continue;
     // Of several senders of one row the store accepts one: whoever was live with it, it has been had.
     if (auto inbox = flight->inbox.lock(); inbox->ahead.settle(rows[i])) continue;
+    if (flight->rebuilding) tell_pilot(*flight, rows[i]);
     enqueue(*flight, rows[i], now);
   }
   for (const auto& f : all()) schedule(f);

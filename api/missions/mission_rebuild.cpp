@@ -29,6 +29,11 @@ void MissionService::State::begin_rebuild(const std::shared_ptr<Flight>& flight)
     flight->rebuilding = false;
     return schedule(flight);
   }
+  {
+    auto exclusions = exclusions_of(flight->id);
+    auto inbox = flight->inbox.lock();
+    inbox->fix_check.emplace(flight->frame, deps.track, std::move(exclusions), inbox->believed);
+  }
   start_reading(*flight);
   continue_rebuild(flight);
 }
@@ -53,6 +58,10 @@ void MissionService::State::continue_rebuild(const std::shared_ptr<Flight>& flig
       work->live.end_reading();
     }
     flight->rebuilding = false;
+    {
+      auto inbox = flight->inbox.lock();
+      inbox->fix_check.reset();
+    }
     self->schedule(flight);
   });
 }

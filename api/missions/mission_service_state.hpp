@@ -13,6 +13,7 @@
 #include "api/missions/stored_rows.hpp"
 #include "api/wire/live_writer.hpp"
 #include "core/base/locked.hpp"
+#include "core/flight/fix_check.hpp"
 #include "core/flight/live_mission.hpp"
 #include "core/ports/anchor_store.hpp"
 #include "core/ports/exclusion_store.hpp"
@@ -53,6 +54,8 @@ struct MissionService::Flight {
     /// Evicted: rows that found it before are in the store, where the next flight reads them.
     bool gone{false};
     std::optional<SteadyTime> fix_arrival{}, range_arrival{};
+    std::optional<Fix> believed{};                ///< the last one that the pilot was told of
+    std::optional<flight::FixCheck> fix_check{};  ///< of what comes while stored rows are read
     /// Something is still to be done, rows that are read back apart.
     bool busy() const { return scheduled || closing || new_priors || !queue.empty(); }
   };
@@ -133,6 +136,9 @@ struct MissionService::State : std::enable_shared_from_this<MissionService::Stat
   void accept(std::span<const R> rows, std::span<const RowOutcome> outcomes);
   template <class R>
   void enqueue(Flight& flight, const R& row, SteadyTime now);
+  /// Past the queue, which waits until what was stored is in: who flies needs to know where the aircraft is.
+  void tell_pilot(Flight& flight, const Fix& fix) const;
+  static void tell_pilot(Flight&, const Range&) {}
   /// A write that the live path does not wait for.
   void later(std::function<Result<void>()> write) const {
     deps.late.write(std::move(write), std::chrono::milliseconds(0));

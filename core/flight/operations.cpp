@@ -69,6 +69,8 @@ void Operations::fix(const Now& now, const Fix& fix) {
                   [&](const auto& one) { return one.first != fix.mission && !flight_of(one.first); });
   }
   const double measured_s = r.fixes.at(fix.time, now.s);
+  // A row that waited for stored ones to be read is no news: the pilot had it, or a newer one, at once.
+  if (r.fix && std::pair(measured_s, fix.time) <= std::pair(*r.fix_s, r.fix->time)) return;
   const bool fixed = fix.fix == FixClass::rtk_fixed;
   const bool unbroken = r.fixed_since_s && r.fix_s && measured_s - *r.fix_s < k_break_s;
   r.fixed_since_s = !fixed ? std::nullopt : unbroken ? r.fixed_since_s : std::optional(measured_s);

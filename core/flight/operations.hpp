@@ -190,7 +190,7 @@ class Operations {
                                        const Groundwork& ground, bool manual) const;
   Result<void> override_item(const Now& now, const MissionId& mission, const std::string& item,
                              const std::string& reason, const std::string& who, const Groundwork& ground);
-  /// Somebody who may fly looks at this checklist: the aircraft gets the plan's fence.
+  /// Somebody who may fly works off this checklist: the aircraft gets the plan's fence.
   void prepare(const MissionId& mission, const Plan& plan) { preparing_.emplace(mission, plan); }
 
   // What there is.

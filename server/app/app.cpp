@@ -129,6 +129,7 @@ api::StorageStatus status_of(Database& database) {
   api::StorageStatus status;
   status.writable = health.writable();
   status.reason = health.reason;
+  status.stalled = health.level == StorageLevel::stalled;
   status.db_bytes = health.db_bytes + health.wal_bytes;
   status.disk_free_bytes = health.disk_free_bytes;
   status.queue_depth = health.queued_rows;
@@ -348,6 +349,12 @@ void App::State::compose() {
   };
   deps.server_alarms = [this] {
     std::vector<api::AlarmCondition> out;
+    if (const auto lost = devices->rows_lost(); lost > 0)
+      out.push_back({"rows.lost", api::AlarmPriority::critical,
+                     std::to_string(lost) +
+                         " rows of devices were not stored since the start; they are in the "
+                         "recording: anchord replay gives them to the server",
+                     std::nullopt});
     if (!tls) return out;
     for (auto& warning : tls_warnings(tls->facts(), tls->failure(), clock.now()))
       out.push_back({std::move(warning.id),

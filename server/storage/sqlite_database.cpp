@@ -26,6 +26,8 @@ using Mode = SqliteConnection::Mode;
 
 // Beyond this size a check at start takes longer than a start may; it then runs beside the first requests.
 constexpr std::uint64_t k_check_at_start_bytes = 256u << 20;
+// A commit takes milliseconds; below this a busy disk would be an alarm.
+constexpr double k_stalled_s = 3;
 
 std::uint64_t size_of(const std::filesystem::path& file) {
   std::error_code error;
@@ -107,6 +109,11 @@ class SqliteDatabase final : public Database, private sql::Gate {
       health.level =
           status.trouble->failure() == sql::Failure::full ? StorageLevel::full : StorageLevel::unavailable;
       health.reason = status.trouble->what();
+    } else if (status.oldest_s > k_stalled_s) {
+      health.level = StorageLevel::stalled;
+      health.reason = "the database has not taken a write for " +
+                      std::to_string(static_cast<int>(status.oldest_s)) +
+                      " s: the disk hangs, or another program holds the database";
     } else if (damage_found_) {
       health.level = StorageLevel::unavailable;
       health.reason = "the check of the database found damage; see the log of the start";

@@ -36,6 +36,7 @@ enum class StorageLevel : std::uint8_t {
   ok,
   disk_low,     ///< below warn_free_bytes
   disk_scarce,  ///< below refuse_free_bytes, or living on the reserve: no new missions
+  stalled,      ///< a write has been under way for seconds: a stuck disk, or somebody else's lock
   full,         ///< the last write found no space
   unavailable,  ///< the last write failed; reopening is tried
 };
@@ -43,6 +44,7 @@ inline constexpr auto k_storage_level_words =
     enum_table<StorageLevel>({{"ok", StorageLevel::ok},
                               {"disk_low", StorageLevel::disk_low},
                               {"disk_scarce", StorageLevel::disk_scarce},
+                              {"stalled", StorageLevel::stalled},
                               {"full", StorageLevel::full},
                               {"unavailable", StorageLevel::unavailable}});
 inline std::string to_string(StorageLevel level) { return std::string(k_storage_level_words.word(level)); }

@@ -33,7 +33,9 @@ WriteQueue::~WriteQueue() {
 }
 
 std::optional<Error> WriteQueue::write(std::size_t rows, const Work& work) {
-  Task task{rows, &work, std::nullopt, false};
+  Task task;
+  task.rows = rows;
+  task.work = &work;
   auto shared = shared_.lock();
   if (shared->stopping) return make_error(Errc::storage_unavailable, "the database is closing");
   const bool too_many_rows = shared->queued_rows > 0 && shared->queued_rows + rows > limits_.max_rows;
@@ -54,6 +56,9 @@ WriteQueue::Status WriteQueue::status() const {
   Status status = shared->status;
   status.queued_calls = shared->queue.size();
   status.queued_rows = shared->queued_rows;
+  auto oldest = shared->writing_since;
+  if (!oldest && !shared->queue.empty()) oldest = shared->queue.front()->since;
+  if (oldest) status.oldest_s = std::chrono::duration<double>(SteadyClock::now() - *oldest).count();
   return status;
 }
 
@@ -83,8 +88,9 @@ void WriteQueue::run() {
       for (Task* task : group) task->error = make_error(Errc::internal, "storage: " + ran.what);
     }
     {
-      const auto shared = shared_.lock();
+      auto shared = shared_.lock();
       for (Task* task : group) task->done = true;
+      shared->writing_since.reset();
     }
     wake_callers_.notify_all();
     (void)guarded("database writer", [this] { checkpoint_if(false); });
@@ -106,6 +112,7 @@ void WriteQueue::take(Group& group) {
     queue.pop_front();
   }
   shared->queued_rows -= rows;
+  if (!group.empty()) shared->writing_since = group.front()->since;
 }
 
 void WriteQueue::commit(Group& group) {

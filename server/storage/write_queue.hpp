@@ -30,6 +30,7 @@ class WriteQueue {
     std::size_t queued_calls{}, queued_rows{};
     std::uint64_t commits{}, rows{};
     double last_commit_s{};
+    double oldest_s{};                ///< how long the call that waits longest has waited; 0: none waits
     std::optional<SqlError> trouble;  ///< of the last write; nothing after one that went well
   };
   using Open = std::function<std::unique_ptr<SqliteConnection>()>;
@@ -54,10 +55,13 @@ class WriteQueue {
     const Work* work{};
     std::optional<Error> error;  ///< of the writer's thread until it is done
     bool done{false};            ///< under the lock of shared_
+    std::chrono::steady_clock::time_point since{std::chrono::steady_clock::now()};
   };
   using Group = std::vector<Task*>;
   struct Shared {
     std::deque<Task*> queue;
+    std::optional<std::chrono::steady_clock::time_point>
+        writing_since;  ///< the oldest of what is written now
     std::size_t queued_rows{0};
     bool stopping{false};
     Status status;

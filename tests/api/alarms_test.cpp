@@ -111,6 +111,7 @@ TEST(AlarmRules, CallDiskQueueAndStore) {
   EXPECT_EQ(raised(well(), {.clock_skew = "3 s fast"}), "clock.skew");
   EXPECT_EQ(raised(well(), {.unrecorded = "no space"}), "recording.failed");
   EXPECT_EQ(raised(well(), {.writable = false, .reason = "the disk is full"}), "storage.unwritable");
+  EXPECT_EQ(raised(well(), {.reason = "no write for 7 s", .stalled = true}), "storage.stalled");
 }
 
 TEST(AlarmRules, GiveEachIdOnceForSeveralFlights) {

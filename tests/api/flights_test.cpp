@@ -103,6 +103,33 @@ TEST_F(Flights, StartsHoldsResumesAndLands) {
   EXPECT_EQ(act("return", lease).status, 422) << "nothing flies any more";
 }
 
+/// Two seconds without a position are a hold, ten the way home: an engineer who excludes rows of a long
+/// flight in the air must cause neither.
+TEST_F(Flights, KeepTheirPositionWhileTheirRowsAreReadAgain) {
+  PausableExecutor live;
+  live_ = &live;
+  app_.reset();
+  database_.reset();
+  open();
+  const auto lease = take_off();
+  live.paused = true;
+  const auto since = k_unix_us + std::llround(drone_->now * 1e6) - 5'000'000;
+  const Json exclusion{{"kind", "fixes"},
+                       {"since", since},
+                       {"until", since + 1'000'000},
+                       {"reason", "a crane stood in the way"}};
+  ASSERT_EQ(post(base() + "/exclusions", exclusion.dump()).status, 201) << exclusion;
+  fly(12);
+  EXPECT_EQ(drone_->holds, 0);
+  EXPECT_EQ(procedure()["status"], "running") << procedure().dump(1);
+  live.go_on();
+  fly(3);
+  EXPECT_EQ(drone_->holds, 0) << "what waited in the queue is no news";
+  EXPECT_EQ(procedure()["status"], "running") << procedure().dump(1);
+  EXPECT_EQ(act("land", lease).status, 202);
+  app_.reset();
+}
+
 /// A flight that measures one anchor at (10, 5, 2): the operator who lands finds it solved, once, and not
 /// published.
 class LandedFlights : public Flights {
@@ -222,12 +249,20 @@ TEST_F(Flights, TheFenceGoesUpWithTheChecklistAndBlocksStartUntilItIsKept) {
     }
     return out;
   };
+  (void)state();
+  fly(3);
+  EXPECT_EQ(state(), "failed") << "to read the list sends nothing";
+  EXPECT_TRUE(drone_->autopilot.fence_list().empty());
+  const auto named = R"({"plan":")" + plan + R"("})";
   Call viewer;
   viewer.roles = {api::Role::viewer};
-  viewer.query = {{"plan", plan}};
-  (void)call(api::Method::get, base() + "/checklist", "", viewer);
+  EXPECT_EQ(call(api::Method::post, base() + "/checklist", named, viewer).status, 403);
+  EXPECT_EQ(post(base() + "/checklist", R"({"plan":"0197a3c9-11aa-7c3d-8e2f-1a2b3c4d5e6f"})").status, 404);
+  EXPECT_EQ(post(base() + "/checklist", R"({"plan":"north"})").status, 422);
+  EXPECT_EQ(post(base() + "/checklist", "{}").status, 422);
   fly(3);
-  EXPECT_TRUE(drone_->autopilot.fence_list().empty()) << "who only watches sends nothing";
+  EXPECT_TRUE(drone_->autopilot.fence_list().empty()) << "what was refused sends nothing";
+  EXPECT_EQ(post(base() + "/checklist", named).status, 200);
   const std::string lease = control()["lease"];
   const auto early = act("start", lease, R"(,"plan":")" + plan + '"');
   EXPECT_EQ(early.status, 422);

@@ -305,6 +305,7 @@ TEST_F(PlanInFlight, TheFenceThatTheAutopilotKeepsIsNotChangedInTheAir) {
                                [](const Json& i) { return i["id"] == "fence" && i["state"] == "ok"; });
   };
   const std::string lease = control()["lease"];
+  ASSERT_EQ(post(base() + "/checklist", R"({"plan":")" + plan + R"("})").status, 200);
   ASSERT_TRUE(fly_until(up, 60));
   fly(12);
   check_everything();

@@ -74,6 +74,30 @@ class HeldExecutor final : public Executor {
   std::deque<Task> tasks_;
 };
 
+/// Runs what is posted at once, as InlineExecutor, but while it is paused.
+class PausableExecutor final : public Executor {
+ public:
+  void post(Task task) override {
+    if (paused) return held_.post(std::move(task));
+    task();
+  }
+  std::unique_ptr<Executor> strand() override { return std::make_unique<Strand>(*this); }
+  void go_on() {
+    paused = false;
+    while (held_.run_one()) continue;
+  }
+  std::atomic<bool> paused{false};
+
+ private:
+  struct Strand final : Executor {
+    explicit Strand(PausableExecutor& of) : all(of) {}
+    void post(Task task) override { all.post(std::move(task)); }
+    std::unique_ptr<Executor> strand() override { return all.strand(); }
+    PausableExecutor& all;
+  };
+  HeldExecutor held_;
+};
+
 /// The application with what the sockets' thread does for it: a round of the streams every 50 ms.
 class StreamingApplication final : public api::Application {
  public:

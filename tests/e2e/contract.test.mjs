@@ -416,6 +416,7 @@ test('a flight by hand: control, checklist, start, hold, abort', async () => {
   await call('POST', `${path}/uploads`, { json: { what: 'fence', plan: ids.plan, lease } }); // there is no aircraft
   await call('POST', `${path}/aircraft`, { expect: 422, json: { lease } }); // nor a link to one
   await call('GET', `${path}/checklist?plan=${ids.plan}`, { expect: 200 });
+  await call('POST', `${path}/checklist`, { expect: 200, json: { plan: ids.plan } });
   for (const item of ['rtk', 'corrections', 'tag', 'disk', 'props', 'airspace', 'people', 'pilot']) {
     await call('POST', `${path}/checklist/${item}`, { expect: 200, json: { reason: 'contract test' } });
   }

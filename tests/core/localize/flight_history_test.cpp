@@ -65,6 +65,10 @@ Estimate known_within(double h95_m, double v95_m) {
   estimate.best = Hypothesis{};
   estimate.h95_m = h95_m;
   estimate.v95_m = v95_m;
+  Gate gate;
+  gate.name = "residuals";
+  gate.passed = true;
+  estimate.gates = {gate};
   return estimate;
 }
 
@@ -82,8 +86,19 @@ TEST(AccuracyGoal, IsJudgedAnewNotTwice) {
   assess_goal(estimate, {.h95_m = 0.2, .v95_m = 0.4});
   EXPECT_FALSE(reached_goal(estimate));
   assess_goal(estimate, {.h95_m = 0.5, .v95_m = 0.5});
-  EXPECT_EQ(estimate.gates.size(), 2U);
+  EXPECT_EQ(estimate.gates.size(), 3U);
   EXPECT_TRUE(reached_goal(estimate));
+}
+
+TEST(AccuracyGoal, IsNotReachedWhereAGateHoldsTheAnchorBackOrNoneWasAsked) {
+  auto held_back = known_within(0.01, 0.01);
+  held_back.gates[0].passed = false;
+  assess_goal(held_back, {});
+  EXPECT_FALSE(reached_goal(held_back));
+  auto not_asked = known_within(0.01, 0.01);
+  not_asked.gates.clear();
+  assess_goal(not_asked, {});
+  EXPECT_FALSE(reached_goal(not_asked));
 }
 
 TEST(AccuracyGoal, IsNotReachedWithoutAPositionOrWithAnotherVerdict) {

@@ -16,6 +16,7 @@
 #include "core/ports/mission_store.hpp"
 #include "tests/server/storage/child.hpp"
 #include "tests/server/storage/store_contract.hpp"
+#include "tests/server/storage/stuck_disk.hpp"
 
 namespace anchord {
 namespace {
@@ -285,6 +286,34 @@ TEST_F(StorageFailure, AnswersUnavailableWhileAnotherProcessHoldsTheLockAndRecov
   } while (!taken && std::chrono::steady_clock::now() < deadline);
   EXPECT_TRUE(taken);
   EXPECT_EQ(db->health().level, StorageLevel::ok);
+}
+
+/// Nothing fails while a disk hangs, so nothing but time tells of it.
+TEST_F(StorageFailure, SaysThatAWriteIsStalledWhileTheDiskHangsAndLosesNothing) {
+  StuckDisk disk;
+  const auto db = open();
+  const auto mission = mission_in(*db);
+  EXPECT_EQ(db->health().level, StorageLevel::ok);
+  StuckDisk::stuck = true;
+  std::atomic<bool> stored{false};
+  std::thread writer([&] {
+    const auto taken = db->stores().measurements.append_ranges(batch(mission.id, 0, 5), false);
+    stored = taken.has_value();
+  });
+  const auto until = [&](StorageLevel level) {
+    const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(30);
+    while (db->health().level != level && std::chrono::steady_clock::now() < deadline)
+      std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    return db->health().level == level;
+  };
+  EXPECT_TRUE(until(StorageLevel::stalled));
+  EXPECT_THAT(db->health().reason, HasSubstr("has not taken a write for"));
+  EXPECT_FALSE(stored) << "what is not on the disk is not acknowledged";
+  StuckDisk::stuck = false;
+  writer.join();
+  EXPECT_TRUE(stored);
+  EXPECT_TRUE(until(StorageLevel::ok));
+  EXPECT_EQ(db->stores().measurements.count_ranges(rows_of(mission.id)).value(), 5U);
 }
 
 TEST_F(StorageFailure, AnswersQueueFullBeyondTheBoundAndLosesNothingOfTheRest) {

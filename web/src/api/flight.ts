@@ -48,5 +48,8 @@ export const order_anchor = (mission: string, anchor: string, lease: string, act
 
 export const checklist = async (mission: string, plan: string | null): Promise<ChecklistItem[]> =>
   (await get('/missions/{id}/checklist', { ...at(mission), query: plan ? { plan } : {} })).items;
+/// This plan is to be flown: the aircraft gets its fence.
+export const work_off_checklist = async (mission: string, plan: string): Promise<ChecklistItem[]> =>
+  (await call('post', '/missions/{id}/checklist', { ...at(mission), body: { plan } })).body.items;
 export const set_item = (mission: string, item: string, reason: string): Promise<unknown> =>
   call('post', '/missions/{id}/checklist/{item}', { path: { id: mission, item }, body: { reason } });

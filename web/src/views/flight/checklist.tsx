@@ -1,7 +1,7 @@
 /// Before take-off: every item green, or a reason for it. Start is blocked until then, by this page and by the server.
-import { useEffect, useState } from 'preact/hooks';
+import { useEffect, useRef, useState } from 'preact/hooks';
 import { error_text } from '../../api/client';
-import { checklist, set_item, type ChecklistItem } from '../../api/flight';
+import { checklist, set_item, work_off_checklist, type ChecklistItem } from '../../api/flight';
 import { plans as fetch_plans, type Plan } from '../../api/plans';
 import { sound, toggle_sound } from '../../ui/alarms';
 import { Icon, Mark } from '../../ui/marks';
@@ -22,6 +22,7 @@ export function Checklist({
     [plan, set_plan] = useState<string | null>(null),
     [manual, set_manual] = useState(false),
     [problem, set_problem] = useState(''),
+    named_plan = useRef<string | null>(null), // which plan the server knows is to be flown
     box = useDialog<HTMLElement>(true, () => (checklist_open.value = false));
   useEffect(() => {
     fetch_plans().then(
@@ -33,12 +34,17 @@ export function Checklist({
     );
   }, []);
   const look = useStable((): void => {
-    checklist(mission, plan).then(
+    const named = plan !== null && named_plan.current !== plan;
+    (named ? work_off_checklist(mission, plan) : checklist(mission, plan)).then(
       (list) => {
+        if (named) named_plan.current = plan;
         set_items(list);
         set_problem('');
       },
-      (e: unknown) => set_problem(error_text(e)),
+      (e: unknown) => {
+        named_plan.current = null; // the server may have started again meanwhile
+        set_problem(error_text(e));
+      },
     );
   });
   useEffect(() => {
