@@ -79,7 +79,7 @@ export async function airborne(plan = flight_plan) {
       as = (json) => ({ token: tokens.pilot, json });
     const flown = (await must('/api/v1/plans', as(plan), 201)).id;
     const list = async () => (await must(`${base}/checklist?plan=${flown}`, { token: tokens.pilot }, 200)).items;
-    await list();
+    await must(`${base}/checklist`, as({ plan: flown }), 200);
     await eventually(
       'the aircraft is heard and its fixes come',
       async () => {

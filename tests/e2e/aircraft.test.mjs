@@ -64,6 +64,7 @@ test('planned from the outline, checked, started', async () => {
   assert.equal(made.status, 200);
   plan = (await send('/api/v1/plans', made.json.plan)).json.id;
   const list = () => get(`/api/v1/missions/${mission}/checklist?plan=${plan}`);
+  assert.equal((await send(`/api/v1/missions/${mission}/checklist`, { plan })).status, 200);
   await eventually(
     'RTK is fixed for 10 s',
     async () => (await list()).items.find((i) => i.id === 'rtk').state === 'ok',

@@ -39,6 +39,7 @@ export async function startFlight(server, mission) {
   });
   const { id: plan } = await send('/api/v1/plans', made.plan);
   const list = () => get(`/api/v1/missions/${mission}/checklist?plan=${plan}`);
+  await send(`/api/v1/missions/${mission}/checklist`, { plan });
   await eventually(
     'RTK is fixed for 10 s',
     async () => (await list()).items.find((i) => i.id === 'rtk').state === 'ok',

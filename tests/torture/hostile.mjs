@@ -264,6 +264,7 @@ test('everything hostile begins, and the flight starts all the same', async () =
     );
   }, 300);
 
+  await call('pilot', 'POST', `/api/v1/missions/${mission}/checklist`, { json: { plan: stored } });
   const checklist = async () =>
     (await call('pilot', 'GET', `/api/v1/missions/${mission}/checklist?plan=${stored}`)).json;
   await eventually(
