@@ -5,6 +5,7 @@ import { useEffect, useRef, useState } from 'preact/hooks';
 import './elevation.css';
 import { interpolated } from '../state/scene';
 import { now_ms, tick } from '../state/store';
+import { not_loaded_words } from '../ui/empty';
 import { accuracy, bearing as bearing_words, fixed } from '../ui/format';
 import { Icon } from '../ui/marks';
 import { ground } from '../ui/theme';
@@ -139,7 +140,9 @@ function words(content: Content, picture: Picture | null, above: string): string
     ...(content.flight?.heights ? [`roof at ${fixed(content.flight.heights.roof_m, 1)} m`] : []),
     ups.length
       ? `${ups.length} anchors between ${fixed(Math.min(...ups), 1)} and ${fixed(Math.max(...ups), 1)} m`
-      : 'no anchors yet',
+      : content.link_lost
+        ? 'no anchor loaded'
+        : 'no anchors yet',
   ].join(', ');
 }
 
@@ -209,7 +212,11 @@ function draw_elevation(
     c.fillStyle = p.ink2;
     c.font = `400 ${p.rem * 0.8125}px ${p.font}`;
     c.textAlign = 'center';
-    c.fillText('Nothing to show yet: no track, no plan, no anchor.', w / 2, h / 2);
+    c.fillText(
+      content.link_lost ? not_loaded_words('lost') : 'Nothing to show yet: no track, no plan, no anchor.',
+      w / 2,
+      h / 2,
+    );
     return [];
   }
   const s = (m: readonly [number, number] | readonly [number, number, number]): number =>

@@ -17,6 +17,7 @@ import {
 } from '../state/store';
 import { alarms, sound, toggle_sound } from './alarms';
 import { fix_word } from './alarm_rules';
+import { not_loaded_words } from './empty';
 import { age, bytes, clock, fixed, millimetres } from './format';
 import { Icon, Mark, type Shape, type Tone } from './marks';
 import { next_theme, theme } from './theme';
@@ -235,7 +236,7 @@ function read(): Record<'link' | 'rtk' | 'uwb' | 'drone' | 'rec' | 'alarms', Rea
     },
     alarms: {
       ...(worst === 'critical' ? look('bad') : worst === 'warning' ? look('caution') : look('off')),
-      word: list.length ? String(list.length) : 'none',
+      word: list.length ? String(list.length) : lost ? 'unknown' : 'none',
       extra: '',
       card: list.length ? (
         <ul>
@@ -247,7 +248,7 @@ function read(): Record<'link' | 'rtk' | 'uwb' | 'drone' | 'rec' | 'alarms', Rea
           ))}
         </ul>
       ) : (
-        <p>Nothing is wrong that anchord can see.</p>
+        <p>{lost ? not_loaded_words('lost') : 'Nothing is wrong that anchord can see.'}</p>
       ),
     },
   };
