@@ -51,6 +51,7 @@ const unstruck = (page) =>
       .filter(
         (el) => /\d/.test(el.textContent) && !el.querySelector('button, input, select, a') && el.checkVisibility(),
       )
+      .concat([...document.querySelectorAll('main .chip')].filter((el) => el.checkVisibility() && !el.closest('.now')))
       .filter((el) => ![el, ...el.querySelectorAll('*')].some(struck))
       .map((el) => `${el.closest('[data-testid]')?.dataset.testid}: ${el.textContent.trim()}`);
   });
@@ -118,7 +119,10 @@ test('what was loaded while nothing else was to be done opens during an outage',
     // What was not loaded is not said to be empty.
     for (const panel of ['flights', 'base', 'levers', 'access', 'audit'])
       assert.match(await text(id(panel)), /Not loaded: no connection to the server/, panel);
-    assert.doesNotMatch(await text(id('system')), /No flight is stored|No token is valid|there is none yet|No site yet/);
+    assert.doesNotMatch(
+      await text(id('system')),
+      /No flight is stored|No token is valid|there is none yet|No site yet/,
+    );
     await id('nav-plan').click();
     await eventually('plan', async () => /Not loaded: no connection/.test(await text(id('plan'))), 5000);
     assert.equal(await id('where').count(), 0);

@@ -14,7 +14,7 @@ import { along, building_bearing, extent, fit, intervals95, wind, type Fit } fro
 import { magnification, round_length } from './enu';
 import type { ElevationProps } from './elevation_props';
 import { elevation_shown } from './elevation_shown';
-import { read_palette, status_colour, trail_style, type Palette } from './palette';
+import { palette_of, read_palette, status_colour, trail_style, type Palette } from './palette';
 import type { Content } from './picture';
 import { anchor_symbol, beyond, drone, label, mirror_dots, reticle, type Box, type Ctx } from './symbols';
 
@@ -63,7 +63,7 @@ export default function ElevationView({
     canvas.current!.width = Math.round(w * ratio);
     canvas.current!.height = Math.round(h * ratio);
     c.setTransform(ratio, 0, 0, ratio, 0, 0);
-    placed.current = draw_elevation(c, read_palette(), w, h, content(), bearing_deg, zero);
+    placed.current = draw_elevation(c, w, h, content(), bearing_deg, zero);
   });
   useEffect(draw, [now, theme, version, w, h, bearing_deg, draw]);
   const picture = arranged(shown, bearing_deg, w, h),
@@ -136,6 +136,7 @@ function words(content: Content, picture: Picture | null, above: string): string
   return [
     'Side elevation',
     ...(picture ? [note(picture, above)] : []),
+    ...(content.link_lost ? ['values are the last known'] : []),
     ...(at ? [`aircraft at ${fixed(at[2] - zero, 1)} m`] : []),
     ...(content.flight?.heights ? [`roof at ${fixed(content.flight.heights.roof_m, 1)} m`] : []),
     ups.length
@@ -198,13 +199,13 @@ function arranged(content: Content, bearing_deg: number, w: number, h: number): 
 
 function draw_elevation(
   c: Ctx,
-  p: Palette,
   w: number,
   h: number,
   content: Content,
   bearing_deg: number,
   zero: string,
 ): { id: string; x: number; y: number }[] {
+  const p = palette_of(read_palette(), content.link_lost);
   c.fillStyle = p.map;
   c.fillRect(0, 0, w, h);
   const picture = arranged(content, bearing_deg, w, h);

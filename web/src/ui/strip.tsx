@@ -236,8 +236,9 @@ function read(): Record<'link' | 'rtk' | 'uwb' | 'drone' | 'rec' | 'alarms', Rea
     },
     alarms: {
       ...(worst === 'critical' ? look('bad') : worst === 'warning' ? look('caution') : look('off')),
+      stale: lost && list.length > 0,
       word: list.length ? String(list.length) : lost ? 'unknown' : 'none',
-      extra: '',
+      extra: lost && list.length ? 'when last heard' : '',
       card: list.length ? (
         <ul>
           {list.map((a) => (
@@ -292,7 +293,7 @@ export function Strip() {
       </a>
       <div class="site">
         <b title={mission?.name ?? ''}>{mission?.name || 'No flight'}</b>
-        <span>
+        <span class={!replay && link.value === 'lost' && mission?.state === 'recording' ? 'stale' : ''}>
           {replay
             ? 'replay'
             : mission

@@ -127,7 +127,9 @@ function Progress() {
       <div class="hd">
         <h2>Flight</h2>
         {lost ? (
-          <Chip shape="off" tone="off" word="LAST KNOWN" />
+          <span class="now">
+            <Chip shape="off" tone="off" word="LAST KNOWN" />
+          </span>
         ) : running ? (
           <Chip shape="ok" tone="ok" word="RECORDING" />
         ) : (
