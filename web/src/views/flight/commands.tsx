@@ -44,6 +44,7 @@ export function FlightBar() {
     lost ? 'no link' : command_note(p?.commands ?? [], action, server_now_us());
   const dead = why_no_command(lost, mine, other),
     gated = (action: string): string => note(action) || (dead ? 'no control' : ''),
+    refused_start = idle && note('start').startsWith('refused') ? note('start') : '',
     off = dead !== '',
     act = (action: Action) => () => void send(mission.mission, action);
   return (
@@ -52,9 +53,9 @@ export function FlightBar() {
       <DevicesNote mission={mission.mission} />
       {p && <PlanNotice p={p} />}
       <div class="cmds" data-testid="commands">
-        {problem.value && (
+        {!checklist_open.value && (problem.value || refused_start) && (
           <p class="problem" role="alert">
-            {problem.value}
+            {problem.value || `Not started: the aircraft ${refused_start}`}
           </p>
         )}
         {operator && taken && (
@@ -165,19 +166,20 @@ export function FlightBar() {
           </button>
         )}
       </div>
-      {operator && idle && <BeforeTakeOff mission={mission.mission} />}
+      {operator && idle && <BeforeTakeOff mission={mission.mission} note={refused_start} />}
     </div>
   );
 }
 
 /// Fetched when there is a flight to start, before anybody asks for it.
 const load_checklist = () => import('./checklist').then((m) => m.Checklist);
-function BeforeTakeOff({ mission }: { mission: string }) {
+function BeforeTakeOff({ mission, note }: { mission: string; note: string }) {
   const { part: Checklist } = useLater(load_checklist);
   if (!checklist_open.value || !Checklist) return null;
   return (
     <Checklist
       mission={mission}
+      note={note}
       start={async (plan, manual) => {
         await send(mission, 'start', { plan, mode: manual ? 'manual' : 'auto' });
         checklist_open.value = problem.value !== '';
