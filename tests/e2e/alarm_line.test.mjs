@@ -50,6 +50,12 @@ test('in flight no command, tile or view moves when alarms come, are several, ar
   for (const [name, width, height] of sizes)
     open.push({ name, ...(await openPage(browser, server, { width, height })) });
   for (const { id } of open) await id('cmd-land').waitFor({ timeout: 20_000 });
+  // Nobody has control here: Hold alone would take it, the others are dead.
+  assert.equal(await open[0].id('cmd-hold').isEnabled(), true);
+  for (const name of ['cmd-skip', 'cmd-return', 'cmd-land']) {
+    assert.equal(await open[0].id(name).isEnabled(), false, name);
+    assert.match(await open[0].id(name).getAttribute('title'), /Nobody has control/, name);
+  }
   for (const one of open) {
     await eventually(`no alarm at first, ${one.name}`, async () => !(await alarmed(one.page)), 30_000);
     one.before = await places(one.page);

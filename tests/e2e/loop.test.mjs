@@ -184,7 +184,10 @@ test('control goes from the tablet to the phone; the tablet is dead at once, and
   await tablet.id('control-grant').tap();
   await phone.id('control').getByText('You have control').waitFor({ timeout: 10_000 });
   await tablet.id('control').getByText('has control, since').waitFor({ timeout: 5000 });
-  assert.equal(await tablet.id('cmd-hold').isEnabled(), false);
+  for (const name of ['cmd-hold', 'cmd-skip', 'cmd-return', 'cmd-land']) {
+    assert.equal(await tablet.id(name).isEnabled(), false, name);
+    assert.match((await tablet.id(name).getAttribute('title')) ?? '', /has control/, name);
+  }
   assert.equal(await phone.id('cmd-hold').isEnabled(), true);
   await compare(tablet, 'on the tablet without control');
   await compare(phone, 'on the phone with control');

@@ -51,6 +51,7 @@ const unstruck = (page) =>
       .filter(
         (el) => /\d/.test(el.textContent) && !el.querySelector('button, input, select, a') && el.checkVisibility(),
       )
+      .concat([...document.querySelectorAll('main .chip')].filter((el) => el.checkVisibility() && !el.closest('.now')))
       .filter((el) => ![el, ...el.querySelectorAll('*')].some(struck))
       .map((el) => `${el.closest('[data-testid]')?.dataset.testid}: ${el.textContent.trim()}`);
   });
@@ -115,9 +116,26 @@ test('what was loaded while nothing else was to be done opens during an outage',
     await eventually('LOST', async () => (await text(id('status-link'))).includes('LOST'), 12_000);
     await id('nav-system').click();
     await id('system').waitFor({ timeout: 5000 });
+    // What was not loaded is not said to be empty.
+    for (const panel of ['flights', 'base', 'levers', 'access', 'audit'])
+      assert.match(await text(id(panel)), /Not loaded: no connection to the server/, panel);
+    assert.doesNotMatch(
+      await text(id('system')),
+      /No flight is stored|No token is valid|there is none yet|No site yet/,
+    );
+    await id('nav-plan').click();
+    await eventually('plan', async () => /Not loaded: no connection/.test(await text(id('plan'))), 5000);
+    assert.equal(await id('where').count(), 0);
+    await id('nav-system').click();
   } finally {
     process.kill(server.pid, 'SIGCONT');
   }
+  await eventually(
+    'the flights are loaded when the link is back',
+    async () => (await id('flights').locator('tbody tr').count()) > 0,
+    20_000,
+  );
+  await eventually('nothing is left out', async () => (await id('not-loaded').count()) === 0, 10_000);
   await page.close();
 });
 

@@ -148,6 +148,24 @@ test('start is blocked until the checklist is green; then the aircraft flies, ho
   assert.deepEqual(await violations(page), []);
   await picture(page, 'checklist-light');
   await eventually('start is free', async () => id('cmd-start').isEnabled());
+  // A Start that is refused says why where it was pressed.
+  const why = 'take-off point is 2.1 m inside the building outline (clearance 4 m)';
+  await page.route(
+    '**/actions',
+    (route) =>
+      route.fulfill({
+        status: 409,
+        contentType: 'application/problem+json',
+        body: JSON.stringify({ type: 'about:blank', title: 'Refused', status: 409, detail: why }),
+      }),
+    { times: 1 },
+  );
+  await hold(page, id('cmd-start'));
+  await id('start-refused').waitFor();
+  assert.ok((await text(id('start-refused'))).includes(why));
+  assert.ok(await id('checklist').isVisible());
+  assert.deepEqual(await violations(page), [], 'a refused start');
+  seen.errors.length = 0; // the refusal itself
   await hold(page, id('cmd-start'));
   await id('procedure').getByText('RUNNING', { exact: true }).waitFor({ timeout: 20_000 });
   await eventually('anchors are heard', async () => (await procedure()).anchors.length > 3, 60_000, 250);

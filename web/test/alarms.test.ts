@@ -1,5 +1,14 @@
 import { describe, expect, it } from 'vitest';
-import { AlarmLimiter, by_urgency, Conditions, merged, type Alarm, type Situation } from '../src/ui/alarm_rules';
+import { event } from '../src/live/messages';
+import {
+  AlarmLimiter,
+  by_urgency,
+  Conditions,
+  merged,
+  newest_refusal,
+  type Alarm,
+  type Situation,
+} from '../src/ui/alarm_rules';
 
 const calm: Situation = {
   now_ms: 0,
@@ -11,6 +20,7 @@ const calm: Situation = {
   fix: 'fixed',
   correction_age_s: 1,
   range_silence_ms: 0,
+  refused: null,
 };
 const ids = (list: readonly Alarm[]): string[] => list.map((a) => a.id);
 
@@ -23,6 +33,14 @@ describe('Conditions', () => {
     expect(ids(c.standing({ ...calm, fix: 'float', now_ms: 3000 }))).toEqual([]);
     expect(ids(c.standing({ ...calm, fix: 'float', now_ms: 8000 }))).toEqual(['rtk.float']);
     expect(ids(c.standing({ ...calm, now_ms: 8100 }))).toEqual([]);
+  });
+  it('raise cmd.refused for a minute, of the flight that is shown', () => {
+    const said = { id: 'e1', t_us: 1_000_000, level: 'warning', code: 'cmd.refused', mission: 'm' },
+      refused = newest_refusal([event({ ...said, text: 'start refused: not armed' })!], 'm', 3_000_000);
+    expect(newest_refusal([event({ ...said, text: 'start refused: not armed' })!], 'other', 3_000_000)).toBeNull();
+    const [a] = new Conditions().standing({ ...calm, now_ms: 9000, refused });
+    expect([a!.id, a!.title, a!.since_ms]).toEqual(['cmd.refused', 'Command refused: start: not armed', 7000]);
+    expect(ids(new Conditions().standing({ ...calm, refused: { ...refused!, age_ms: 60_000 } }))).toEqual([]);
   });
   it('raise uwb.none after 5 s without a range, but not before the first one', () => {
     const c = new Conditions();

@@ -1,7 +1,14 @@
 import { describe, expect, it } from 'vitest';
 import { procedure } from '../src/live/flight_messages';
 import { event, type EventMsg } from '../src/live/messages';
-import { answer_of, asked_at_us, command_note, loss_of, question_of } from '../src/views/flight/control';
+import {
+  answer_of,
+  asked_at_us,
+  command_note,
+  loss_of,
+  question_of,
+  why_no_command,
+} from '../src/views/flight/control';
 
 const T = 1_777_889_472_000_000,
   s = (n: number): number => T + n * 1e6;
@@ -62,5 +69,15 @@ describe('the note under a command', () => {
     expect(command_note(land('refused'), 'land', s(31))).toBe('');
     expect(command_note(land('unconfirmed'), 'land', s(31))).toBe('NOT CONFIRMED');
     expect(command_note(land('accepted'), 'hold', s(3))).toBe('');
+  });
+});
+
+describe('a command', () => {
+  const other = { holder: 'operator 2', since_us: T, expires_us: s(60) };
+  it('can be given by the page that has control, and by no other', () => {
+    expect(why_no_command(false, true, null)).toBe('');
+    expect(why_no_command(false, false, null)).toMatch(/^Nobody has control: take control first/);
+    expect(why_no_command(false, false, other)).toMatch(/^operator 2 has control/);
+    expect(why_no_command(true, true, null)).toMatch(/^No link/);
   });
 });

@@ -1,6 +1,6 @@
 import { describe, expect, it } from 'vitest';
 import { procedure } from '../src/live/flight_messages';
-import { estimate, mission } from '../src/live/messages';
+import { estimate, mission, type EstimateMsg } from '../src/live/messages';
 import {
   accuracy_goal,
   against_goal,
@@ -34,6 +34,24 @@ describe('an anchor is done', () => {
     expect(goal_of(anchor('0x2', 'converged'), p)).toEqual({ of: 'sigma', limit_m: 0.03 });
     const own = flight([{ ...task('0x2', false, false), target_sigma_m: 0.01 }]);
     expect(goal_of(anchor('0x2', 'converged'), own)).toEqual({ of: 'sigma', limit_m: 0.01 });
+  });
+  it('by its own target, where it has one, whatever the goal of the site', () => {
+    const own = flight([{ ...task('0x1', false, true), target_sigma_m: 3 }, task('0x2', false, false)]),
+      far = { ...anchor('0x1', 'estimating', 4), cov_enu_m2: [4, 0, 0, 1, 0, 1] as const },
+      shown = as_shown(far, own);
+    expect(shown.status).toBe('converged');
+    expect(shown.gates.map((g) => [g.name, g.limit, g.passed])).toEqual([['target_sigma_m', 3, true]]);
+    expect(why_not_done(shown)).toBeNull();
+    // Accurate enough for the site, not for its flight: one limit, the target.
+    const near = as_shown(anchor('0x2', 'converged'), own);
+    expect(near.status).toBe('estimating');
+    expect(near.gates.filter((g) => !g.passed).map((g) => g.name)).toEqual(['target_sigma_m']);
+    // Another gate still holds it back.
+    const held = { name: 'halves', value: 30, limit: 16, passed: false, why: '' };
+    expect(as_shown({ ...(far as never as EstimateMsg), gates: [...far.gates, held] }, own).status).toBe('estimating');
+    const passes = { ...(far as never as EstimateMsg), status: 'passes' as const };
+    expect(against_goal(passes, { h95_m: 0.2, v95_m: 0.4 }, own).status).toBe('within_goal');
+    expect(over_goal_words({ ...passes, anchor: '0x2' }, null, own)).toBe('over the target of its flight, σ 0.030 m');
   });
   it('never when its time ran out, nor when the flight ended before: given up is not green', () => {
     for (const p of [flight([task('0x1', true, false)]), flight([task('0x1', false, false)], 'aborted')]) {

@@ -8,6 +8,7 @@ vi.hoisted(() => {
 });
 vi.mock('../src/ui/theme', () => ({ css: () => '' }));
 import { numbered } from '../src/map/flight_layer';
+import { palette_of, type Palette } from '../src/map/palette';
 import { mark_trail, trail_stands, type Content } from '../src/map/picture';
 import { Scene } from '../src/state/scene';
 import { beyond, free_place, type Box } from '../src/map/symbols';
@@ -89,5 +90,15 @@ describe('the trail below the drone', () => {
     longer.trail.push(...flown(60).trail);
     expect(trail_stands(of_longer, content(longer))).toBe(false); // too much would be drawn with every frame
     expect(trail_stands(null, content(null))).toBe(true);
+  });
+});
+
+describe('the map with the link lost', () => {
+  it('has no colour of a state', () => {
+    const live = { ink3: 'grey', ok: 'green', caution: 'amber', bad: 'red', info: 'blue', off: 'black', old: false };
+    expect(palette_of(live as Palette, false)).toBe(live);
+    const lost = palette_of(live as Palette, true);
+    expect([lost.ok, lost.caution, lost.bad, lost.info, lost.off]).toEqual(Array(5).fill('grey'));
+    expect(lost.old).toBe(true);
   });
 });

@@ -5,6 +5,7 @@ import { useEffect, useRef, useState } from 'preact/hooks';
 import './elevation.css';
 import { interpolated } from '../state/scene';
 import { now_ms, tick } from '../state/store';
+import { not_loaded_words } from '../ui/empty';
 import { accuracy, bearing as bearing_words, fixed } from '../ui/format';
 import { Icon } from '../ui/marks';
 import { ground } from '../ui/theme';
@@ -13,7 +14,7 @@ import { along, building_bearing, extent, fit, intervals95, wind, type Fit } fro
 import { magnification, round_length } from './enu';
 import type { ElevationProps } from './elevation_props';
 import { elevation_shown } from './elevation_shown';
-import { read_palette, status_colour, trail_style, type Palette } from './palette';
+import { palette_of, read_palette, status_colour, trail_style, type Palette } from './palette';
 import type { Content } from './picture';
 import { anchor_symbol, beyond, drone, label, mirror_dots, reticle, type Box, type Ctx } from './symbols';
 
@@ -62,7 +63,7 @@ export default function ElevationView({
     canvas.current!.width = Math.round(w * ratio);
     canvas.current!.height = Math.round(h * ratio);
     c.setTransform(ratio, 0, 0, ratio, 0, 0);
-    placed.current = draw_elevation(c, read_palette(), w, h, content(), bearing_deg, zero);
+    placed.current = draw_elevation(c, w, h, content(), bearing_deg, zero);
   });
   useEffect(draw, [now, theme, version, w, h, bearing_deg, draw]);
   const picture = arranged(shown, bearing_deg, w, h),
@@ -135,11 +136,14 @@ function words(content: Content, picture: Picture | null, above: string): string
   return [
     'Side elevation',
     ...(picture ? [note(picture, above)] : []),
+    ...(content.link_lost ? ['values are the last known'] : []),
     ...(at ? [`aircraft at ${fixed(at[2] - zero, 1)} m`] : []),
     ...(content.flight?.heights ? [`roof at ${fixed(content.flight.heights.roof_m, 1)} m`] : []),
     ups.length
       ? `${ups.length} anchors between ${fixed(Math.min(...ups), 1)} and ${fixed(Math.max(...ups), 1)} m`
-      : 'no anchors yet',
+      : content.link_lost
+        ? 'no anchor loaded'
+        : 'no anchors yet',
   ].join(', ');
 }
 
@@ -195,13 +199,13 @@ function arranged(content: Content, bearing_deg: number, w: number, h: number): 
 
 function draw_elevation(
   c: Ctx,
-  p: Palette,
   w: number,
   h: number,
   content: Content,
   bearing_deg: number,
   zero: string,
 ): { id: string; x: number; y: number }[] {
+  const p = palette_of(read_palette(), content.link_lost);
   c.fillStyle = p.map;
   c.fillRect(0, 0, w, h);
   const picture = arranged(content, bearing_deg, w, h);
@@ -209,7 +213,11 @@ function draw_elevation(
     c.fillStyle = p.ink2;
     c.font = `400 ${p.rem * 0.8125}px ${p.font}`;
     c.textAlign = 'center';
-    c.fillText('Nothing to show yet: no track, no plan, no anchor.', w / 2, h / 2);
+    c.fillText(
+      content.link_lost ? not_loaded_words('lost') : 'Nothing to show yet: no track, no plan, no anchor.',
+      w / 2,
+      h / 2,
+    );
     return [];
   }
   const s = (m: readonly [number, number] | readonly [number, number, number]): number =>

@@ -1,7 +1,7 @@
 /// The map as a component: loads the engine when first shown, and offers zoom, follow and fit as buttons.
 import { useEffect, useRef, useState } from 'preact/hooks';
 import { backdrop_version } from '../state/floors';
-import { when_back } from '../state/store';
+import { watched_lost, when_back } from '../state/store';
 import { Icon } from '../ui/marks';
 import { ground } from '../ui/theme';
 import { Elevation } from './elevation_box';
@@ -69,7 +69,8 @@ export function MapBox({ content, onSelect, label, follow, version, zero }: Prop
     };
   }, [attempt]);
   const backdrop = backdrop_version.value;
-  useEffect(() => map.current?.changed(), [version, backdrop]);
+  const lost = watched_lost();
+  useEffect(() => map.current?.changed(), [version, backdrop, lost]);
   const theme = ground.value;
   useEffect(() => {
     map.current?.theme_changed();

@@ -22,7 +22,11 @@ export interface Palette {
   readonly casing: number;
   readonly rem: number;
   readonly font: string;
+  readonly old: boolean; ///< values are the last known: grey and struck
 }
+/// With the link lost nothing on the map is current: no colour of a state, every value struck.
+export const palette_of = (p: Palette, link_lost: boolean): Palette =>
+  link_lost ? { ...p, ok: p.ink3, caution: p.ink3, bad: p.ink3, info: p.ink3, off: p.ink3, old: true } : p;
 export function read_palette(): Palette {
   const n = (name: string): number => Number(css(name)) || 1;
   return {
@@ -44,6 +48,7 @@ export function read_palette(): Palette {
     casing: n('--lw-halo'),
     rem: parseFloat(getComputedStyle(document.documentElement).fontSize) || 16,
     font: css('--font'),
+    old: false,
   };
 }
 export const status_colour = (p: Palette, s: AnchorStatus): string =>

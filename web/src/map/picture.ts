@@ -6,7 +6,7 @@ import { accuracy, age, percent } from '../ui/format';
 import { to_px, type Camera } from './camera';
 import { round_length } from './enu';
 import { draw_flight, numbered, type FlightPicture } from './flight_layer';
-import { range_colour, status_colour, trail_style, type Palette } from './palette';
+import { palette_of, range_colour, status_colour, trail_style, type Palette } from './palette';
 import { anchor_symbol, beyond, drone, ellipse_at, label, mirror_dots, reticle, type Box, type Ctx } from './symbols';
 
 export interface Content {
@@ -25,7 +25,8 @@ const RANGE_STALE_MS = 2000,
 const symbol_r = (p: Palette): number => p.rem * 0.47;
 
 /// Grid, ellipses and what was flown, below everything that moves.
-export function draw_slow(c: Ctx, p: Palette, cam: Camera, content: Content, magnified: number): void {
+export function draw_slow(c: Ctx, palette: Palette, cam: Camera, content: Content, magnified: number): void {
+  const p = palette_of(palette, content.link_lost);
   c.fillStyle = p.map;
   c.fillRect(0, 0, cam.w, cam.h);
   grid(c, p, cam);
@@ -66,7 +67,8 @@ export function draw_backdrop(c: Ctx, cam: Camera, b: Backdrop): void {
   c.restore();
 }
 /// Symbols and labels, above the ranges: a line must never strike out a name.
-export function draw_top(c: Ctx, p: Palette, cam: Camera, content: Content): void {
+export function draw_top(c: Ctx, palette: Palette, cam: Camera, content: Content): void {
+  const p = palette_of(palette, content.link_lost);
   c.clearRect(0, 0, cam.w, cam.h);
   const r = symbol_r(p),
     placed = content.anchors.filter((a) => a.enu_m),
@@ -186,7 +188,8 @@ export function trail_stands(mark: TrailMark | null, content: Content): boolean 
 const TRAIL_AHEAD = 50; // 5 s of positions
 
 /// Drone and ranges, and the trail from where the slow picture ends.
-export function draw_fast(c: Ctx, p: Palette, cam: Camera, content: Content, now_ms: number, from: number): void {
+export function draw_fast(c: Ctx, palette: Palette, cam: Camera, content: Content, now_ms: number, from: number): void {
+  const p = palette_of(palette, content.link_lost);
   c.clearRect(0, 0, cam.w, cam.h);
   const scene = content.scene;
   if (!scene) return;

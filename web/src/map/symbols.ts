@@ -289,8 +289,13 @@ export function label(
   if (sub) {
     c.font = subs;
     c.strokeText(sub, tx, box.y + h1 + 3);
-    c.fillStyle = p.ink2;
+    c.fillStyle = p.old ? p.ink3 : p.ink2;
     c.fillText(sub, tx, box.y + h1 + 3);
+    if (p.old) {
+      const long = width_of(c, subs, sub),
+        from = c.textAlign === 'right' ? tx - long : c.textAlign === 'left' ? tx : tx - long / 2;
+      c.fillRect(from, box.y + h1 + 3 + h2 / 2, long, 1.5);
+    }
   }
   c.restore();
 }

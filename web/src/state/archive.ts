@@ -4,7 +4,18 @@ import { request } from '../api/client';
 import { fix_class, mission, num, obj, str, vec3, type MissionMsg } from '../live/messages';
 import { enu_from_geodetic } from '../map/enu';
 import type { TrailPoint } from './scene';
-import { current_mission, events, link, mission_id, mission_list, now_ms, scene_of, synced, tick } from './store';
+import {
+  current_mission,
+  events,
+  link,
+  mission_id,
+  mission_list,
+  now_ms,
+  scene_of,
+  synced,
+  tick,
+  when_back,
+} from './store';
 
 const micros = (rfc3339: unknown): number | null => {
   const ms = Date.parse(str(rfc3339));
@@ -37,10 +48,10 @@ export async function load_missions(): Promise<void> {
       .filter((m) => !known.has(m.mission));
     for (const m of news) scene_of(m.mission).add_state(m, now_ms());
     if (news.length) mission_list.value = [...mission_list.value, ...news];
+    synced.value = true;
   } catch {
-    /* the stream alone will do */
+    /* what the stream tells will do; asked again when the link is back */
   }
-  synced.value = true;
 }
 /// Estimates of a flight nobody feeds any more: asked for once, when it is looked at and the stream gave none.
 async function load_estimates(id: string): Promise<void> {
@@ -110,6 +121,9 @@ export function follow_archive(): void {
   });
   effect(() => {
     if (link.value === 'lost') asked = tracked = null;
+  });
+  when_back(() => {
+    if (!synced.peek()) void load_missions();
   });
   let restored = '';
   effect(() => {

@@ -220,6 +220,7 @@ export function connect(live: LiveSource, refused: () => void, fresh: () => void
     restarted: () => {
       scenes.clear();
       mission_list.value = [];
+      synced.value = false;
       server_alarms.value = [];
       devices.value = [];
       events.value = [];

@@ -1,5 +1,5 @@
 /// Which alarms stand, and when one may sound. No DOM, time comes in as an argument.
-import type { AlarmMsg, FixClass } from '../live/messages';
+import type { AlarmMsg, EventMsg, FixClass } from '../live/messages';
 import type { LinkState } from '../live/source';
 
 export type Priority = AlarmMsg['priority'];
@@ -22,7 +22,22 @@ export interface Situation {
   readonly fix: FixClass | null;
   readonly correction_age_s: number | null;
   readonly range_silence_ms: number; ///< Infinity before the first range
+  readonly refused: Refusal | null; ///< the newest command that the aircraft or the procedure did not carry out
 }
+export interface Refusal {
+  readonly id: string;
+  readonly text: string;
+  readonly age_ms: number;
+}
+export function newest_refusal(
+  events: readonly EventMsg[],
+  mission: string | null,
+  server_now_us: number,
+): Refusal | null {
+  const e = events.filter((x) => x.code === 'cmd.refused' && x.mission === mission).at(-1);
+  return e ? { id: e.id, text: e.text, age_ms: Math.max(0, server_now_us - e.t_us) / 1000 } : null;
+}
+const REFUSED_MS = 60_000; ///< for so long a refusal is news
 
 const RANK: Record<Priority, number> = { critical: 0, warning: 1, advisory: 2 };
 export const by_rank = (a: Alarm, b: Alarm): number => RANK[a.priority] - RANK[b.priority] || a.since_ms - b.since_ms;
@@ -86,6 +101,15 @@ export class Conditions {
       'This page cannot keep up',
       'It is sent less often what it shows, never older. Go nearer to the access point, or close other pages and programs.',
     );
+    if (s.refused && s.refused.age_ms < REFUSED_MS)
+      out.push({
+        id: 'cmd.refused',
+        priority: 'warning',
+        title: `Command refused: ${s.refused.text.replace(/^\w+ refused: /, (w) => w.replace(' refused', ''))}`,
+        advice: 'It was not carried out. Remove the reason and command again, or use the remote control.',
+        since_ms: s.now_ms - s.refused.age_ms,
+        acknowledged: false,
+      });
     const range_silence_ms = Math.min(s.range_silence_ms, s.now_ms - this.data_from_ms);
     const ranging = s.recording && s.range_silence_ms < 60_000;
     const poor = s.fix === 'none' || s.fix === 'single' || s.fix === 'dgps';

@@ -2,6 +2,7 @@ import { computed, effect, signal } from '@preact/signals';
 import {
   current_mission,
   current_scene,
+  events,
   link,
   live_source,
   now_ms,
@@ -9,7 +10,7 @@ import {
   server_now_us,
   tick,
 } from '../state/store';
-import { AlarmLimiter, Conditions, merged, type Alarm } from './alarm_rules';
+import { AlarmLimiter, Conditions, merged, newest_refusal, type Alarm } from './alarm_rules';
 
 const conditions = new Conditions();
 const limiter = new AlarmLimiter();
@@ -31,6 +32,7 @@ export const alarms = computed<readonly Alarm[]>(() => {
     fix: scene?.rtk?.value.fix ?? scene?.pose?.value.fix ?? null,
     correction_age_s: scene?.rtk?.value.correction_age_s ?? null,
     range_silence_ms: scene ? now - scene.range_at_ms : Infinity,
+    refused: newest_refusal(events.value, mission?.mission ?? null, server_now_us()),
   });
   return merged(own, server_alarms.value, server_now_us(), now, link.value === 'lost').map((a) =>
     acknowledged.value.has(a.id) ? { ...a, acknowledged: true } : a,

@@ -57,6 +57,11 @@ const WORDS: Record<string, Words> = {
     unit: 'm',
   },
   settled: { passes: 'The joint solution settled', fails: 'The joint solution did not settle, rounds', unit: '' },
+  target_sigma_m: {
+    passes: 'Target of the flight reached, σ of the position',
+    fails: 'Target of the flight not reached, σ of the position',
+    unit: 'm',
+  },
   goal_h95_m: {
     passes: 'Accuracy goal reached, 95 % horizontal',
     fails: 'Accuracy goal not reached, 95 % horizontal',
@@ -69,7 +74,7 @@ const WORDS: Record<string, Words> = {
   },
 };
 /// Whether it is accurate enough; every other gate asks whether it is right.
-export const is_goal = (g: Gate): boolean => g.name.startsWith('goal_');
+export const is_goal = (g: Gate): boolean => g.name.startsWith('goal_') || g.name === 'target_sigma_m';
 const plain_name = (name: string): string => name.replaceAll('_', ' ').replace(/^./, (c) => c.toUpperCase());
 
 /// What the gate found, as a statement that is true as it stands: a failed gate never reads "halves agree".

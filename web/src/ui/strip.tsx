@@ -17,6 +17,7 @@ import {
 } from '../state/store';
 import { alarms, sound, toggle_sound } from './alarms';
 import { fix_word } from './alarm_rules';
+import { not_loaded_words } from './empty';
 import { age, bytes, clock, fixed, millimetres } from './format';
 import { Icon, Mark, type Shape, type Tone } from './marks';
 import { next_theme, theme } from './theme';
@@ -235,8 +236,9 @@ function read(): Record<'link' | 'rtk' | 'uwb' | 'drone' | 'rec' | 'alarms', Rea
     },
     alarms: {
       ...(worst === 'critical' ? look('bad') : worst === 'warning' ? look('caution') : look('off')),
-      word: list.length ? String(list.length) : 'none',
-      extra: '',
+      stale: lost && list.length > 0,
+      word: list.length ? String(list.length) : lost ? 'unknown' : 'none',
+      extra: lost && list.length ? 'when last heard' : '',
       card: list.length ? (
         <ul>
           {list.map((a) => (
@@ -247,7 +249,7 @@ function read(): Record<'link' | 'rtk' | 'uwb' | 'drone' | 'rec' | 'alarms', Rea
           ))}
         </ul>
       ) : (
-        <p>Nothing is wrong that anchord can see.</p>
+        <p>{lost ? not_loaded_words('lost') : 'Nothing is wrong that anchord can see.'}</p>
       ),
     },
   };
@@ -291,7 +293,7 @@ export function Strip() {
       </a>
       <div class="site">
         <b title={mission?.name ?? ''}>{mission?.name || 'No flight'}</b>
-        <span>
+        <span class={!replay && link.value === 'lost' && mission?.state === 'recording' ? 'stale' : ''}>
           {replay
             ? 'replay'
             : mission

@@ -3,6 +3,8 @@ import { useEffect, useState } from 'preact/hooks';
 import type { AnchorRow } from '../api/anchors';
 import { error_text } from '../api/client';
 import { by_suspicion, residuals, SECTORS, solves, weight_by_sector, type Residual } from '../api/residuals';
+import { link, when_back } from '../state/store';
+import { NotLoaded } from '../ui/empty';
 import { bearing, clock, fixed, millimetres, range_m } from '../ui/format';
 import { Axes, Drawing, scale, ticks, type Frame } from './chart';
 import { useStable } from '../ui/use_stable';
@@ -11,6 +13,7 @@ interface Loaded {
   readonly of: string;
   readonly rows: readonly Residual[];
   readonly none: string;
+  readonly failed: boolean;
 }
 
 export function AnchorResiduals({ row, mission }: { row: AnchorRow; mission: string | null }) {
@@ -26,19 +29,22 @@ export function AnchorResiduals({ row, mission }: { row: AnchorRow; mission: str
     const rows = await residuals(solve, row);
     return [rows, rows.length ? '' : 'The calibration kept none of this anchor.'];
   });
+  const [attempt, set_attempt] = useState(0),
+    failed = got?.of === key && got.failed;
+  useEffect(() => (failed ? when_back(() => set_attempt((n) => n + 1)) : undefined), [failed]);
   useEffect(() => {
     let gone = false;
-    const tell = (rows: readonly Residual[], none: string): void => {
-      if (!gone) set_got({ of: key, rows, none });
+    const tell = (rows: readonly Residual[], none: string, failed = false): void => {
+      if (!gone) set_got({ of: key, rows, none, failed });
     };
     read().then(
       ([rows, none]) => tell(rows, none),
-      (e: unknown) => tell([], error_text(e)),
+      (e: unknown) => tell([], error_text(e), true),
     );
     return () => {
       gone = true;
     };
-  }, [key, read]);
+  }, [key, read, attempt]);
   if (got?.of !== key) return null;
   const used = got.rows.filter((r) => r.weight > 0).length;
   return (
@@ -51,7 +57,9 @@ export function AnchorResiduals({ row, mission }: { row: AnchorRow; mission: str
           </span>
         )}
       </div>
-      {got.none ? (
+      {got.failed && link.value === 'lost' ? (
+        <NotLoaded failed />
+      ) : got.none ? (
         <p class="why">{got.none}</p>
       ) : (
         <>

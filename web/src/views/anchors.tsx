@@ -9,8 +9,9 @@ import { MapBox } from '../map/map_box';
 import { done_count, shown_estimates } from '../state/done';
 import { backdrops } from '../state/floors';
 import { me, may_publish } from '../state/session';
-import { chosen_anchor, current_mission, current_scene, link, revision, synced, tick } from '../state/store';
+import { chosen_anchor, current_mission, current_scene, link, revision, synced, tick, when_back } from '../state/store';
 import type { MissionMsg } from '../live/messages';
+import { Empty, not_loaded_words } from '../ui/empty';
 import { Icon } from '../ui/marks';
 import { useLater } from '../ui/use_later';
 import { ColumnPicker } from './anchor_columns';
@@ -99,6 +100,7 @@ export function Anchors({ anchor }: { anchor: string | null }) {
     document.title = 'Anchors - anchord';
     follow_revisions();
   }, []);
+  useEffect(() => when_back(() => void load_published()), []);
   const answered = useRef<string | null>(null),
     known = loaded.value;
   useEffect(() => {
@@ -248,9 +250,11 @@ export function Anchors({ anchor }: { anchor: string | null }) {
           <p class="why pad" role={looking ? 'status' : undefined} data-testid={looking ? 'unknown-anchor' : undefined}>
             {!looking
               ? 'Nothing is selected.'
-              : (known || problem.value) && synced.value
-                ? `No anchor ${linked} is known here: it is neither published nor in range in this flight. Check the address, or choose one from the table.`
-                : `Looking for anchor ${linked}.`}
+              : link.value === 'lost' && !known
+                ? not_loaded_words('lost')
+                : (known || problem.value) && synced.value
+                  ? `No anchor ${linked} is known here: it is neither published nor in range in this flight. Check the address, or choose one from the table.`
+                  : `Looking for anchor ${linked}.`}
           </p>
         )}
       </aside>
@@ -273,7 +277,9 @@ function Nothing({ live, filtered }: { live: boolean; filtered: boolean }) {
   if (live)
     return (
       <div class="empty small">
-        <p>{synced.value ? 'No anchor has been in range in this flight.' : 'Loading.'}</p>
+        <Empty cls="" loaded={synced.value && link.value !== 'lost'}>
+          No anchor has been in range in this flight.
+        </Empty>
         <a class="btn" href="#/live">
           Go to Live
         </a>
@@ -281,7 +287,9 @@ function Nothing({ live, filtered }: { live: boolean; filtered: boolean }) {
     );
   return (
     <div class="empty small">
-      <p>Nothing is published yet. Facility tools see an empty list until a calibration is published.</p>
+      <Empty cls="" loaded={loaded.value !== null} failed={problem.value !== null}>
+        Nothing is published yet. Facility tools see an empty list until a calibration is published.
+      </Empty>
       <button class="btn" onClick={() => (source.value = 'live')}>
         Show live estimates
       </button>

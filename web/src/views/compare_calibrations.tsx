@@ -3,6 +3,7 @@ import { useEffect, useState } from 'preact/hooks';
 import { error_text } from '../api/client';
 import { common_shift, shifts, solves, type Shift, type Solve } from '../api/residuals';
 import { mission_list, revision } from '../state/store';
+import { NotLoaded, useLoad } from '../ui/empty';
 import { bearing, date, fixed, millimetres } from '../ui/format';
 import { Chip, Icon, type Shape, type Tone } from '../ui/marks';
 import { useDialog } from '../ui/use_dialog';
@@ -23,16 +24,18 @@ export function CompareCalibrations() {
     [rows, set_rows] = useState<readonly Shift[] | null>(null),
     [problem, set_problem] = useState(''),
     box = useDialog<HTMLElement>(true, () => (compare_open.value = false));
-  useEffect(() => {
+  useLoad(() => {
+    if (list) return;
     solves().then(
       (all) => {
         set_list(all);
         set_of(all[0]?.id ?? '');
+        set_problem('');
         if (revision.peek() === null && all[1]) set_against(all[1].id);
       },
       (e: unknown) => set_problem(error_text(e)),
     );
-  }, []);
+  });
   useEffect(() => {
     let gone = false;
     set_rows(null);
@@ -74,6 +77,7 @@ export function CompareCalibrations() {
           <Icon name="close" />
         </button>
       </div>
+      {!list && <NotLoaded failed={problem !== ''} />}
       {list?.length === 0 ? (
         <p class="why">Nothing was solved yet: Review and publish makes the first calibration.</p>
       ) : (

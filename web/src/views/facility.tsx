@@ -4,7 +4,7 @@ import { ApiError, error_text } from '../api/client';
 import { change_facility, facility, patch_of, type Facility, type Fields } from '../api/facility';
 import { draft_of } from '../state/drafts';
 import { may } from '../state/session';
-import { say } from '../state/store';
+import { say, when_back } from '../state/store';
 import { useDraft } from '../ui/use_draft';
 import { useStable } from '../ui/use_stable';
 
@@ -28,7 +28,10 @@ export function FacilityPanel({ anchor, changed }: { anchor: string; changed: ()
     [editing, set_editing] = useState('');
   const load = useStable((): Promise<void> =>
     facility(anchor).then(
-      (f) => set_read({ ...f, anchor }),
+      (f) => {
+        set_read({ ...f, anchor });
+        set_problem('');
+      },
       (e: unknown) => {
         if (!(e instanceof ApiError && e.problem.status === 404)) set_problem(error_text(e));
       },
@@ -39,7 +42,9 @@ export function FacilityPanel({ anchor, changed }: { anchor: string; changed: ()
     set_editing(draft_of(key_of(anchor)) ? anchor : '');
     void load();
   }, [anchor, load]);
-  const known = read?.anchor === anchor ? read : null;
+  const missing = read?.anchor !== anchor;
+  useEffect(() => (missing ? when_back(() => void load()) : undefined), [missing, load]);
+  const known = missing ? null : read;
   if (!known && !problem) return null;
   return (
     <section class="sec-p" data-testid="facility">

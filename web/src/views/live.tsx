@@ -18,6 +18,7 @@ import {
   synced,
   tick,
 } from '../state/store';
+import { not_loaded_words } from '../ui/empty';
 import { bearing, clock, fixed, grouped, millimetres, told_apart } from '../ui/format';
 import { Chip, Q } from '../ui/marks';
 import { useLater } from '../ui/use_later';
@@ -100,9 +101,7 @@ function Waiting() {
       <p role="status">
         {me.value === null
           ? 'Sign in to see the flights of this server.'
-          : link.value === 'lost' || link.value === 'late'
-            ? 'Waiting for anchord to answer.'
-            : 'Loading the flights of this server.'}
+          : not_loaded_words(link.value, link.value === 'late')}
       </p>
     </div>
   );
@@ -128,7 +127,9 @@ function Progress() {
       <div class="hd">
         <h2>Flight</h2>
         {lost ? (
-          <Chip shape="off" tone="off" word="LAST KNOWN" />
+          <span class="now">
+            <Chip shape="off" tone="off" word="LAST KNOWN" />
+          </span>
         ) : running ? (
           <Chip shape="ok" tone="ok" word="RECORDING" />
         ) : (

@@ -19,7 +19,7 @@ import { enu_from_geodetic } from '../map/enu';
 import { may } from '../state/session';
 import { keep_draft } from '../state/drafts';
 import { accuracy_goal, against_goal, over_goal_words, type AccuracyGoal } from '../state/done';
-import { current_scene, revision, say } from '../state/store';
+import { current_scene, revision, say, scene_of } from '../state/store';
 import { accuracy, date, fixed } from '../ui/format';
 import { Icon, Mark, StatusChip, STATUS_LOOK } from '../ui/marks';
 import { useDraft } from '../ui/use_draft';
@@ -47,8 +47,9 @@ export function Publish({ mission }: { mission: MissionMsg }) {
     [problem, set_problem] = useState(''),
     [busy, set_busy] = useState<'' | 'calibrating' | 'publishing' | 'planning'>('calibrating'),
     [picked, pick] = useState<string | null>(null);
-  const solves = may('engineer'),
-    draft = made && { ...made, rows: made.rows.map((r) => against_goal(r, goal)) };
+  const flown = scene_of(mission.mission).procedure?.value,
+    solves = may('engineer'),
+    draft = made && { ...made, rows: made.rows.map((r) => against_goal(r, goal, flown)) };
   const keys = useRef({ calibrate: idempotency_key(), publish: idempotency_key() }),
     [form, change, forget] = useDraft<Form>(`publish/${mission.mission}`, { note: '', reasons: {}, left: {} }),
     { note, reasons, left } = form,
@@ -200,7 +201,7 @@ export function Publish({ mission }: { mission: MissionMsg }) {
                     pick={() => pick(r.anchor === picked ? null : r.anchor)}
                     r={r}
                     moved={moved.get(r.anchor)}
-                    over={goal && r.status === 'over_goal' ? over_goal_words(r, goal) : ''}
+                    over={r.status === 'over_goal' ? over_goal_words(r, goal, flown) : ''}
                     reason={reasons[r.anchor]}
                     set_reason={(reason) => change({ reasons: { ...reasons, [r.anchor]: reason } })}
                     left={left[r.anchor]}

@@ -3,6 +3,7 @@ import { useEffect, useRef } from 'preact/hooks';
 import type { RangeMsg } from '../live/messages';
 import { chosen_anchor, replayed, watched_mission, watched_scene, now_ms, tick, watched_lost } from '../state/store';
 import { range_class, rate_hz, type RangeRow } from '../state/scene';
+import { not_loaded_words } from '../ui/empty';
 import { age, fixed, percent, range_m } from '../ui/format';
 import { CLASS_LOOK, Mark, Q } from '../ui/marks';
 import { refused_words } from '../ui/words';
@@ -68,9 +69,11 @@ export function RangeList({ selected }: { selected: string | null }) {
         <p class="why">
           {replayed.value
             ? 'No range up to this moment.'
-            : running
-              ? 'No range yet. Is the tag powered, and is an anchor in reach?'
-              : 'The last 20 s of ranges are shown while a flight is recorded.'}
+            : lost
+              ? not_loaded_words('lost')
+              : running
+                ? 'No range yet. Is the tag powered, and is an anchor in reach?'
+                : 'The last 20 s of ranges are shown while a flight is recorded.'}
         </p>
       ) : (
         <table class="rg">

@@ -5,6 +5,7 @@ import { checklist, set_item, work_off_checklist, type ChecklistItem } from '../
 import { plans as fetch_plans, type Plan } from '../../api/plans';
 import { sound, toggle_sound } from '../../ui/alarms';
 import { Icon, Mark } from '../../ui/marks';
+import { problem as refused } from './lease';
 import { checklist_open } from './checklist_open';
 import { HoldButton } from './hold_button';
 import { useDialog } from '../../ui/use_dialog';
@@ -12,9 +13,11 @@ import { useStable } from '../../ui/use_stable';
 
 export function Checklist({
   mission,
+  note,
   start,
 }: {
   mission: string;
+  note: string; ///< that the aircraft refused the last Start, and why; else empty
   start: (plan: string, manual: boolean) => Promise<void>;
 }) {
   const [items, set_items] = useState<readonly ChecklistItem[] | null>(null),
@@ -24,6 +27,9 @@ export function Checklist({
     [problem, set_problem] = useState(''),
     named_plan = useRef<string | null>(null), // which plan the server knows is to be flown
     box = useDialog<HTMLElement>(true, () => (checklist_open.value = false));
+  useEffect(() => {
+    refused.value = ''; // of another command
+  }, []);
   useEffect(() => {
     fetch_plans().then(
       (list) => {
@@ -123,6 +129,12 @@ export function Checklist({
             </li>
           )}
         </ul>
+      )}
+      {(refused.value || note) && (
+        <div class="callout bad refusal" role="alert" data-testid="start-refused">
+          <b>Not started</b>
+          <p>{refused.value || `The aircraft ${note}`}</p>
+        </div>
       )}
       <div class="actions">
         <span class="mut grow" role="status">

@@ -8,7 +8,7 @@ import { clock, fixed, percent } from '../../ui/format';
 import { useLater } from '../../ui/use_later';
 import { checklist_open } from './checklist_open';
 import { DevicesNote } from './devices_note';
-import { command_note, question_of } from './control';
+import { command_note, question_of, why_no_command } from './control';
 import { HoldButton } from './hold_button';
 import { PlanNotice } from './plan_notice';
 import { ask, asking, give_back, lease, lost_control, problem, refuse, send, take } from './lease';
@@ -42,7 +42,10 @@ export function FlightBar() {
     taken = lost_control.value?.mission === mission.mission ? lost_control.value : null;
   const note = (action: string): string =>
     lost ? 'no link' : command_note(p?.commands ?? [], action, server_now_us());
-  const off = lost || !operator || other !== null,
+  const dead = why_no_command(lost, mine, other),
+    gated = (action: string): string => note(action) || (dead ? 'no control' : ''),
+    refused_start = idle && note('start').startsWith('refused') ? note('start') : '',
+    off = dead !== '',
     act = (action: Action) => () => void send(mission.mission, action);
   return (
     <div class="fbar" data-testid="flight-bar">
@@ -50,9 +53,9 @@ export function FlightBar() {
       <DevicesNote mission={mission.mission} />
       {p && <PlanNotice p={p} />}
       <div class="cmds" data-testid="commands">
-        {problem.value && (
+        {!checklist_open.value && (problem.value || refused_start) && (
           <p class="problem" role="alert">
-            {problem.value}
+            {problem.value || `Not started: the aircraft ${refused_start}`}
           </p>
         )}
         {operator && taken && (
@@ -118,7 +121,13 @@ export function FlightBar() {
         {operator && p && flying(p) && (
           <>
             {p.status === 'hold' ? (
-              <HoldButton testid="cmd-resume" disabled={off} note={note('resume')} onConfirm={act('resume')}>
+              <HoldButton
+                testid="cmd-resume"
+                disabled={off}
+                why={dead}
+                note={gated('resume')}
+                onConfirm={act('resume')}
+              >
                 Resume
               </HoldButton>
             ) : (
@@ -126,6 +135,7 @@ export function FlightBar() {
                 class="cmd primary"
                 data-testid="cmd-hold"
                 disabled={lost || other !== null}
+                title={other ? dead : undefined}
                 onClick={act('hold')}
               >
                 <span>
@@ -134,13 +144,13 @@ export function FlightBar() {
                 </span>
               </button>
             )}
-            <HoldButton testid="cmd-skip" disabled={off} note={note('skip')} onConfirm={act('skip')}>
+            <HoldButton testid="cmd-skip" disabled={off} why={dead} note={gated('skip')} onConfirm={act('skip')}>
               Skip
             </HoldButton>
-            <HoldButton testid="cmd-return" disabled={off} note={note('return')} onConfirm={act('return')}>
+            <HoldButton testid="cmd-return" disabled={off} why={dead} note={gated('return')} onConfirm={act('return')}>
               Return
             </HoldButton>
-            <HoldButton testid="cmd-land" disabled={off} note={note('land')} onConfirm={act('land')}>
+            <HoldButton testid="cmd-land" disabled={off} why={dead} note={gated('land')} onConfirm={act('land')}>
               Land
             </HoldButton>
           </>
@@ -156,19 +166,20 @@ export function FlightBar() {
           </button>
         )}
       </div>
-      {operator && idle && <BeforeTakeOff mission={mission.mission} />}
+      {operator && idle && <BeforeTakeOff mission={mission.mission} note={refused_start} />}
     </div>
   );
 }
 
 /// Fetched when there is a flight to start, before anybody asks for it.
 const load_checklist = () => import('./checklist').then((m) => m.Checklist);
-function BeforeTakeOff({ mission }: { mission: string }) {
+function BeforeTakeOff({ mission, note }: { mission: string; note: string }) {
   const { part: Checklist } = useLater(load_checklist);
   if (!checklist_open.value || !Checklist) return null;
   return (
     <Checklist
       mission={mission}
+      note={note}
       start={async (plan, manual) => {
         await send(mission, 'start', { plan, mode: manual ? 'manual' : 'auto' });
         checklist_open.value = problem.value !== '';

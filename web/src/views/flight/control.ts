@@ -6,6 +6,15 @@ import type { EventMsg } from '../../live/messages';
 export interface Held extends Lease {
   readonly mission: string;
 }
+/// Why a page cannot give a command; empty where it can. Hold alone takes control by itself where nobody has it.
+export const why_no_command = (lost: boolean, mine: boolean, other: ControlMsg | null): string =>
+  lost
+    ? 'No link to the server: use the remote control'
+    : mine
+      ? ''
+      : other
+        ? `${other.holder} has control: ask for it, or take it`
+        : 'Nobody has control: take control first';
 const ENDED_US = 2_000_000; // a procedure that was on its way when control was taken does not end it
 
 /// Control of this page that is gone by the word of the stream: somebody took it, or it ran out. Null while it is ours.

@@ -8,12 +8,14 @@ export function HoldButton({
   onConfirm,
   disabled,
   note,
+  why = '',
   testid,
 }: {
   children: ComponentChildren;
   onConfirm: () => void;
   disabled: boolean;
   note: string;
+  why?: string; ///< why it is disabled
   testid: string;
 }) {
   const [holding, set_holding] = useState(false),
@@ -22,7 +24,9 @@ export function HoldButton({
     press = useRef(new Press()).current,
     timer = useRef<ReturnType<typeof setTimeout>>(),
     tapped_ms = useRef<number | null>(null),
-    fired = useRef(false);
+    fired = useRef(false),
+    dead = useRef(disabled);
+  dead.current = disabled;
   useEffect(() => () => clearTimeout(timer.current), []);
   useEffect(() => {
     if (asked_ms === null) return;
@@ -34,7 +38,7 @@ export function HoldButton({
     fired.current = true;
     set_holding(false);
     set_asked_ms(null);
-    onConfirm();
+    if (!dead.current) onConfirm(); // control may have gone while it was held
   };
   const ring_in = (ms: number): void => {
     const due_ms = performance.now() + ms;
@@ -83,6 +87,7 @@ export function HoldButton({
     <button
       class={`cmd${holding ? ' holding' : ''}${asked ? ' asked' : ''}`}
       disabled={disabled}
+      title={disabled && why ? why : undefined}
       data-testid={testid}
       onPointerDown={down}
       onPointerUp={up}

@@ -12,7 +12,8 @@ import {
 } from '../../api/exclusions';
 import type { Filter, Sample } from '../../api/measurements';
 import { may } from '../../state/session';
-import { say } from '../../state/store';
+import { say, when_back } from '../../state/store';
+import { NotLoaded } from '../../ui/empty';
 import { grouped } from '../../ui/format';
 import { Icon } from '../../ui/marks';
 import { useStable } from '../../ui/use_stable';
@@ -37,8 +38,16 @@ export function ExcludePanel({
     [busy, set_busy] = useState(false),
     key = useRef(idempotency_key());
   const read = (): void => {
-    exclusions_of(mission).then(set_list, (e: unknown) => set_problem(error_text(e)));
+    exclusions_of(mission).then(
+      (found) => {
+        set_list(found);
+        set_problem('');
+      },
+      (e: unknown) => set_problem(error_text(e)),
+    );
   };
+  const read_again = useStable(read);
+  useEffect(() => when_back(read_again), [read_again]);
   const begin = useStable((): void => {
     set_list(null);
     set_picked(sample ? [sample.id] : []);
@@ -156,6 +165,7 @@ export function ExcludePanel({
             : 'Set a time span in the filter above: the rows in it are excluded.'}
         </p>
       )}
+      {!list && <NotLoaded cls="pad" failed={problem !== ''} />}
       {list && list.length === 0 && <p class="pad">Every measurement of this flight is in use.</p>}
       {list && list.length > 0 && (
         <table class="tbl" data-testid="exclusion-list">

@@ -4,7 +4,9 @@ import '../desk.css';
 import './measurements.css';
 import { download_url } from '../../api/measurements';
 import { may } from '../../state/session';
+import { synced } from '../../state/store';
 import { grouped } from '../../ui/format';
+import { Empty, NotLoaded } from '../../ui/empty';
 import { Icon } from '../../ui/marks';
 import { CampaignMode } from './campaign_mode';
 import { ExcludePanel } from './exclude';
@@ -49,14 +51,12 @@ export function Measurements() {
         )}
         {!source && (
           <div class="empty small">
-            <p>Nothing has been measured yet. Fly, import a flight folder, or import a campaign with ground truth.</p>
+            <Empty cls="" loaded={synced.value && desk.campaigns_loaded}>
+              Nothing has been measured yet. Fly, import a flight folder, or import a campaign with ground truth.
+            </Empty>
           </div>
         )}
-        {source && !current && !problem && (
-          <p class="pad" role="status">
-            Loading the measurements.
-          </p>
-        )}
+        {source && !current && !problem && <NotLoaded cls="pad" />}
         {current && n_known === 0 && !at_end(rows) && rows.sizes.length > 0 && !problem && (
           <p class="pad" role="status">
             Looking further: none in the first {grouped(rows.sizes.length * SCANNED)}.

@@ -11,7 +11,7 @@ import {
   type Sample,
   type Source,
 } from '../../api/measurements';
-import { mission_id, ordered_missions } from '../../state/store';
+import { mission_id, ordered_missions, when_back } from '../../state/store';
 import { grouped } from '../../ui/format';
 import { keys_on } from '../../ui/help_state';
 import { useStable } from '../../ui/use_stable';
@@ -33,7 +33,7 @@ export const everything = (f: Filter): boolean => JSON.stringify(f) === JSON.str
 export type Desk = ReturnType<typeof useMeasurements>;
 
 export function useMeasurements() {
-  const [campaigns, set_campaigns] = useState<readonly Source[]>([]),
+  const [loaded_campaigns, set_campaigns] = useState<readonly Source[] | null>(null),
     [wanted, set_wanted] = useState<string | null>(null),
     [filters, set_filters] = useState<{ of: string; filter: Filter }>({ of: '', filter: EVERYTHING }),
     [oldest_first, set_oldest] = useState(false);
@@ -51,6 +51,11 @@ export function useMeasurements() {
   useEffect(() => {
     fetch_campaigns().then(set_campaigns, () => undefined);
   }, [again]);
+  const read_anew = useStable((): void => {
+    if (problem || !loaded_campaigns) set_again((n) => n + 1);
+  });
+  useEffect(() => when_back(read_anew), [read_anew]);
+  const campaigns = loaded_campaigns ?? [];
   const missions: Source[] = ordered_missions.value.map((m) => ({
       kind: 'mission',
       id: m.mission,
@@ -175,6 +180,7 @@ export function useMeasurements() {
   return {
     missions,
     campaigns,
+    campaigns_loaded: loaded_campaigns !== null,
     source,
     choose: set_wanted,
     filter,

@@ -7,6 +7,7 @@ import { error_text } from '../../api/client';
 import { cancel_job, TASKS, type Model, type Run, type RunNumbers } from '../../api/learning';
 import { CopyBox } from '../../ui/copy_box';
 import { fixed } from '../../ui/format';
+import { NotLoaded } from '../../ui/empty';
 import { Chip } from '../../ui/marks';
 import { BiasPanel } from './bias';
 import { Compare } from './compare';
@@ -137,11 +138,7 @@ export function Models({ path }: { path: string | null }) {
         {rules_open.value && <Rules />}
         {!rules_open.value && (
           <>
-            {!all && !problem && (
-              <p class="pad" role="status">
-                Loading the training runs.
-              </p>
-            )}
+            {all?.task !== of && <NotLoaded cls="pad" failed={problem !== ''} />}
             {all?.task === of && runs.length === 0 && <Nothing />}
             {compared.length > 1 && (
               <Compare task={of} runs={compared} close={() => (location.hash = address(chosen?.id ?? '', []))} />

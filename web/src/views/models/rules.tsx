@@ -8,6 +8,7 @@ import {
   type Rates,
   type Rules as RulesOf,
 } from '../../api/rules';
+import { NotLoaded, useLoad } from '../../ui/empty';
 import { fixed, grouped } from '../../ui/format';
 import { Q } from '../../ui/marks';
 
@@ -28,9 +29,15 @@ export function Rules() {
     [wanted, set_wanted] = useState<string | null>(null),
     [rules, set_rules] = useState<{ of: string; rules: RulesOf } | null>(null),
     [problem, set_problem] = useState('');
-  useEffect(() => {
-    fetch_datasets().then(set_sets, (e: unknown) => set_problem(error_text(e)));
-  }, []);
+  useLoad(() => {
+    fetch_datasets().then(
+      (list) => {
+        set_sets(list);
+        set_problem('');
+      },
+      (e: unknown) => set_problem(error_text(e)),
+    );
+  });
   const chosen = wanted ?? sets?.[0]?.id ?? null,
     shown = rules?.of === chosen ? rules.rules : null;
   useEffect(() => {
@@ -78,6 +85,7 @@ export function Rules() {
           <b>The rules could not be evaluated.</b> {problem}
         </div>
       )}
+      {!sets && <NotLoaded failed={problem !== ''} />}
       {sets?.length === 0 && <p class="why">No data set is frozen yet.</p>}
       {shown && shown.rows.length === 0 && (
         <p class="why">

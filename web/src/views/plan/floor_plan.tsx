@@ -20,6 +20,7 @@ import {
 import { sites as fetch_sites, type Site } from '../../api/site';
 import { follow_floors } from '../../state/floors';
 import { say } from '../../state/store';
+import { Empty, useLoad } from '../../ui/empty';
 import { fixed } from '../../ui/format';
 import { Icon } from '../../ui/marks';
 import { useDialog } from '../../ui/use_dialog';
@@ -52,7 +53,7 @@ export const clicks_of = (rows: readonly Row[]): Click[] =>
 
 export function FloorPlanDialog({ corners, close, use_outline }: Props) {
   const [all, set_all] = useState<readonly Floor[]>([]),
-    [sites, set_sites] = useState<readonly Site[]>([]),
+    [sites, set_sites] = useState<readonly Site[] | null>(null),
     [held, set_held] = useState<Held | null>(null),
     [problem, set_problem] = useState(''),
     [busy, set_busy] = useState(''),
@@ -64,15 +65,17 @@ export function FloorPlanDialog({ corners, close, use_outline }: Props) {
       .catch((e: unknown) => set_problem(error_text(e)))
       .then(() => set_busy(''));
   };
-  useEffect(() => {
+  useLoad(() => {
+    if (sites) return;
     Promise.all([fetch_floors(), fetch_sites()]).then(
       ([f, s]) => {
         set_all(f);
         set_sites(s);
+        set_problem('');
       },
       (e: unknown) => set_problem(error_text(e)),
     );
-  }, []);
+  });
   return (
     <section
       class="drawer floorplan"
@@ -146,12 +149,12 @@ function NewFloor({
   busy,
   make,
 }: {
-  sites: readonly Site[];
+  sites: readonly Site[] | null;
   busy: boolean;
   make: (site: string, building: string, name: string, level: number) => void;
 }) {
   const [form, set_form] = useState({ site: '', building: '', name: '', level: '0' }),
-    site = form.site || sites[0]?.id,
+    site = form.site || sites?.[0]?.id,
     text = (key: 'building' | 'name' | 'level', words: string) => (
       <label>
         <span class="lab">{words}</span>
@@ -164,7 +167,7 @@ function NewFloor({
         />
       </label>
     );
-  if (!sites.length) return <p class="why">There is no site yet: an admin makes one in System.</p>;
+  if (!sites?.length) return <Empty loaded={sites !== null}>There is no site yet: an admin makes one in System.</Empty>;
   return (
     <form
       class="facility"

@@ -9,6 +9,7 @@ import { elevation_shown } from '../../map/elevation_shown';
 import type { Geodetic } from '../../map/enu';
 import { may } from '../../state/session';
 import { current_mission, current_scene, now_ms, tick } from '../../state/store';
+import { NotLoaded } from '../../ui/empty';
 import { age } from '../../ui/format';
 import { Icon } from '../../ui/marks';
 import { useLater } from '../../ui/use_later';
@@ -59,7 +60,7 @@ export function Plan({ id }: { id: string | null }) {
       {floor_plan_open.value && <FloorPlan desk={desk} />}
       <div class="planbody">
         <Drawn desk={desk} shown={shown} />
-        <Side desk={desk} shown={shown} show={show} />
+        {desk.ready && <Side desk={desk} shown={shown} show={show} />}
       </div>
     </div>
   );
@@ -113,7 +114,9 @@ function Toolbar({ desk }: { desk: Desk }) {
         readOnly={!able}
         onInput={(e) => desk.rename(e.currentTarget.value)}
       />
-      <span class="mut">{plan.id ? `revision ${plan.revision}${dirty ? ', changed' : ''}` : 'not saved'}</span>
+      <span class="mut">
+        {!desk.ready ? '' : plan.id ? `revision ${plan.revision}${dirty ? ', changed' : ''}` : 'not saved'}
+      </span>
       <span class="grow" />
       {may('integrator') && (
         <button class="btn" data-testid="open-floor-plan" onClick={() => (floor_plan_open.value = true)}>
@@ -228,7 +231,9 @@ function Drawn({ desk, shown }: { desk: Desk; shown: Shown }) {
           )}
         </div>
       )}
-      {origin ? (
+      {!desk.ready ? (
+        <NotLoaded cls="why pad" failed={desk.problem !== ''} />
+      ) : origin ? (
         <PlanMap
           plan={plan}
           origin={origin}
@@ -247,8 +252,6 @@ function Drawn({ desk, shown }: { desk: Desk; shown: Shown }) {
         />
       ) : able ? (
         <Where set={desk.set_origin} />
-      ) : !desk.ready ? (
-        <p class="why pad">Loading the plans.</p>
       ) : (
         <p class="why pad">There is no plan yet. An operator draws one.</p>
       )}

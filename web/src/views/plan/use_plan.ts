@@ -18,7 +18,8 @@ import {
 import type { Geodetic } from '../../map/enu';
 import { may } from '../../state/session';
 import { draft_of, drop_draft, keep_draft, newest_draft } from '../../state/drafts';
-import { current_mission, current_scene, say, tick } from '../../state/store';
+import { current_mission, current_scene, say, tick, when_back } from '../../state/store';
+import { useLoad } from '../../ui/empty';
 import { useStable } from '../../ui/use_stable';
 import {
   begun,
@@ -111,21 +112,21 @@ export function usePlan(id: string | null) {
             list.find((p) => draft_key(p.id) === last) ??
             (last === draft_key(null) ? EMPTY : list[0]);
         open_with_draft(wanted ?? EMPTY);
+        set_problem('');
         set_ready(true);
       },
-      (e: unknown) => {
-        set_problem(error_text(e));
-        set_ready(true);
-      },
+      (e: unknown) => set_problem(error_text(e)),
     );
   });
   useEffect(begin, [id, begin]);
-  useEffect(() => {
+  // What is drawn stays: only where the plans could not be read are they asked for again.
+  useEffect(() => (ready ? undefined : when_back(begin)), [ready, begin]);
+  useLoad(() => {
     published().then(
       ({ rows }) => set_known(new Map(rows.map((r) => [r.anchor, r]))),
       () => undefined,
     );
-  }, []);
+  });
   // Checked while it is drawn; whoever may only look sees what is saved checked. The last check stays, grey, until the next comes.
   const drawn = JSON.stringify({ ...plan, name: '', revision: 0, id: null }),
     check = checked?.check ?? null;

@@ -7,7 +7,17 @@ import { MapBox } from '../../map/map_box';
 import { after, estimates_over_time, load_recording, neighbour, Player } from '../../state/recording';
 import { shown_estimates } from '../../state/done';
 import { alarms_at, procedure_at, status_of } from '../../state/moment';
-import { chosen_anchor, mission_id, now_ms, ordered_missions, replayed, synced, tick } from '../../state/store';
+import {
+  chosen_anchor,
+  mission_id,
+  now_ms,
+  ordered_missions,
+  replayed,
+  synced,
+  tick,
+  when_back,
+  link,
+} from '../../state/store';
 import { clock, fixed, told_apart } from '../../ui/format';
 import { Chip, Mark, Q } from '../../ui/marks';
 import { AnchorCard } from '../anchor_card';
@@ -15,6 +25,7 @@ import '../flight/flight.css';
 import { sentence, Track } from '../flight/procedure';
 import { STATUS_LOOK, STEP_WORDS } from '../flight/words';
 import { RangeList } from '../range_list';
+import { not_loaded_words } from '../../ui/empty';
 import { useStable } from '../../ui/use_stable';
 
 const SPEEDS = [0.25, 0.5, 1, 2, 4, 8, 16] as const;
@@ -24,6 +35,7 @@ export function Replay({ id }: { id: string | null }) {
   const [player, set_player] = useState<Player | null>(null),
     [problem, set_problem] = useState(''),
     [playing, set_playing] = useState(false),
+    [attempt, set_attempt] = useState(0),
     [speed, set_speed] = useState<number>(1),
     [moment, set_moment] = useState<'asked' | 'moment' | 'whole'>('asked'),
     [, redraw] = useState(0);
@@ -44,6 +56,7 @@ export function Replay({ id }: { id: string | null }) {
       async (recording) => {
         const made = new Player(recording);
         if (gone) return;
+        set_problem('');
         made.to(recording.from_us + at_s * 1e6, now_ms());
         show(made);
         set_player(made);
@@ -67,7 +80,9 @@ export function Replay({ id }: { id: string | null }) {
       replayed.value = null;
     };
   });
-  useEffect(begin, [mission?.mission, begin]);
+  useEffect(begin, [mission?.mission, attempt, begin]);
+  const failed = problem !== '';
+  useEffect(() => (failed ? when_back(() => set_attempt((n) => n + 1)) : undefined), [failed]);
   const go = useStable((t_us: number): void => {
     if (player) {
       player.to(t_us, now_ms());
@@ -143,7 +158,9 @@ export function Replay({ id }: { id: string | null }) {
     return (
       <div class="empty">
         <p role="status">
-          {synced.value ? 'No flight is stored under this address.' : 'Loading the flights of this server.'}
+          {synced.value && link.value !== 'lost'
+            ? 'No flight is stored under this address.'
+            : not_loaded_words(link.value)}
         </p>
         <a class="btn" href="#/live">
           Go to Live

@@ -1,5 +1,5 @@
 /// Who may use this server, and what was done on it: tokens with one role each, and the audit log.
-import { useEffect, useState } from 'preact/hooks';
+import { useState } from 'preact/hooks';
 import { error_text } from '../../api/client';
 import {
   audit as fetch_audit,
@@ -12,6 +12,7 @@ import {
   type Token,
 } from '../../api/system';
 import { say } from '../../state/store';
+import { Empty, useLoad } from '../../ui/empty';
 import { CopyBox } from '../../ui/copy_box';
 import { date } from '../../ui/format';
 
@@ -25,16 +26,22 @@ const ROLE_WORDS: Record<string, string> = {
 };
 
 export function AccessPanel() {
-  const [all, set_all] = useState<readonly Token[]>([]),
+  const [all, set_all] = useState<readonly Token[] | null>(null),
     [problem, set_problem] = useState(''),
     [name, set_name] = useState(''),
     [role, set_role] = useState<Role>('viewer'),
     [secret, set_secret] = useState(''),
     [sure, set_sure] = useState('');
   const load = (): void => {
-    fetch_tokens().then(set_all, (e: unknown) => set_problem(error_text(e)));
+    fetch_tokens().then(
+      (list) => {
+        set_all(list);
+        set_problem('');
+      },
+      (e: unknown) => set_problem(error_text(e)),
+    );
   };
-  useEffect(load, []);
+  useLoad(load);
   const guarded = async (work: () => Promise<void>): Promise<void> => {
     set_problem('');
     try {
@@ -59,7 +66,7 @@ export function AccessPanel() {
         say(`${t.name} revoked`);
       });
   };
-  const valid = all.filter((t) => !t.revoked_at);
+  const valid = (all ?? []).filter((t) => !t.revoked_at);
   return (
     <section class="sys-p" data-testid="access">
       <h2>Access</h2>
@@ -143,18 +150,26 @@ export function AccessPanel() {
         </tbody>
       </table>
       {valid.length === 0 && (
-        <p class="why">No token is valid: only this computer without sign-in can reach the server.</p>
+        <Empty loaded={all !== null} failed={problem !== ''}>
+          No token is valid: only this computer without sign-in can reach the server.
+        </Empty>
       )}
     </section>
   );
 }
 
 export function AuditPanel() {
-  const [lines, set_lines] = useState<readonly AuditLine[]>([]),
+  const [lines, set_lines] = useState<readonly AuditLine[] | null>(null),
     [problem, set_problem] = useState('');
-  useEffect(() => {
-    fetch_audit().then(set_lines, (e: unknown) => set_problem(error_text(e)));
-  }, []);
+  useLoad(() => {
+    fetch_audit().then(
+      (list) => {
+        set_lines(list);
+        set_problem('');
+      },
+      (e: unknown) => set_problem(error_text(e)),
+    );
+  });
   return (
     <section class="sys-p" data-testid="audit">
       <h2>Audit log</h2>
@@ -175,7 +190,7 @@ export function AuditPanel() {
             </tr>
           </thead>
           <tbody>
-            {lines.map((l, i) => (
+            {lines?.map((l, i) => (
               <tr key={`${l.at}${i}`}>
                 <th scope="row">{l.at.slice(0, 19).replace('T', ' ')}</th>
                 <td>{l.who}</td>
@@ -185,7 +200,11 @@ export function AuditPanel() {
             ))}
           </tbody>
         </table>
-        {lines.length === 0 && !problem && <p class="why">Nothing has been changed yet.</p>}
+        {!lines?.length && (
+          <Empty loaded={lines !== null} failed={problem !== ''}>
+            Nothing has been changed yet.
+          </Empty>
+        )}
       </div>
     </section>
   );

@@ -6,6 +6,7 @@ import { change_site, create_site, sites as fetch_sites, type BaseSource, type S
 import { may } from '../../state/session';
 import { say } from '../../state/store';
 import { accuracy, fixed, latlon, plain } from '../../ui/format';
+import { Empty, NotLoaded } from '../../ui/empty';
 import { CopyBox } from '../../ui/copy_box';
 import { Chip, Q } from '../../ui/marks';
 
@@ -49,11 +50,17 @@ export function base_words(s: Pick<Site, 'source' | 'sigma_m' | 'frame'>): {
 export function BasePanel() {
   const [list, set_list] = useState<readonly Site[] | null>(null),
     [chosen, set_chosen] = useState(''),
-    [bases, set_bases] = useState<readonly Device[]>([]),
+    [bases, set_bases] = useState<readonly Device[] | null>(null),
     [editing, set_editing] = useState(false),
     [problem, set_problem] = useState('');
   const load = (): void => {
-    fetch_sites().then(set_list, (e: unknown) => set_problem(error_text(e)));
+    fetch_sites().then(
+      (sites) => {
+        set_list(sites);
+        set_problem('');
+      },
+      (e: unknown) => set_problem(error_text(e)),
+    );
     fetch_devices().then(
       (all) => set_bases(all.filter((d) => d.kind === 'ntrip' && d.enabled)),
       () => undefined,
@@ -66,7 +73,7 @@ export function BasePanel() {
   }, []);
   const site = list?.find((s) => s.id === chosen) ?? list?.[0] ?? null,
     words = site && base_words(site),
-    reported = bases.find((d) => d.base)?.base ?? null,
+    reported = bases?.find((d) => d.base)?.base ?? null,
     admin = may('admin');
   return (
     <section class="sys-p" data-testid="base">
@@ -102,6 +109,7 @@ export function BasePanel() {
           <span class="why">{words.text}</span>
         </div>
       )}
+      {list === null && <NotLoaded failed={problem !== ''} />}
       {list?.length === 0 && (
         <p class="why">
           No site yet, so nobody knows in which datum positions are.{' '}
@@ -173,11 +181,11 @@ export function BasePanel() {
           />
         </>
       ) : (
-        <p class="why">
-          {bases.length
+        <Empty loaded={bases !== null} failed={problem !== ''}>
+          {bases?.length
             ? 'The caster has not sent its position yet (RTCM 1005 or 1006 comes every few seconds).'
             : 'They reach the rover by its own radio, so this server does not see where the base stands. With an NTRIP device here it is known.'}
-        </p>
+        </Empty>
       )}
       {admin &&
         (editing || list?.length === 0 ? (

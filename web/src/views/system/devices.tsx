@@ -5,6 +5,7 @@ import { error_text } from '../../api/client';
 import { act_on_device, discover, type Found, type Radio } from '../../api/devices';
 import { may } from '../../state/session';
 import { say, server_now_us } from '../../state/store';
+import { NotLoaded } from '../../ui/empty';
 import { CopyBox } from '../../ui/copy_box';
 import { age, fixed } from '../../ui/format';
 import { Chip, Mark, Q } from '../../ui/marks';
@@ -103,6 +104,7 @@ export function DevicesPanel({ guided }: { guided: boolean }) {
           done={finished}
         />
       )}
+      {!all && <NotLoaded failed={problem !== ''} />}
       {all && rows.length === 0 && (
         <p class="why">
           This server drives no device itself. Measurements may still come over REST, or by importing a flight.{' '}

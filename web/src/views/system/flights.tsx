@@ -11,28 +11,32 @@ import {
 } from '../../api/missions';
 import { may } from '../../state/session';
 import { load_missions } from '../../state/archive';
-import { events, say } from '../../state/store';
+import { events, say, when_back } from '../../state/store';
+import { Empty } from '../../ui/empty';
 import { date, grouped } from '../../ui/format';
+import { useStable } from '../../ui/use_stable';
 
 const days = (seconds: number): string =>
   seconds < 172_800 ? `${Math.ceil(seconds / 3600)} h` : `${Math.floor(seconds / 86_400)} days`;
 
 export function FlightsPanel() {
-  const [all, set_all] = useState<readonly StoredFlight[]>([]),
+  const [all, set_all] = useState<readonly StoredFlight[] | null>(null),
     [bin, set_bin] = useState<readonly StoredFlight[]>([]),
     [problem, set_problem] = useState(''),
     [sure, set_sure] = useState('');
-  const load = (): void => {
+  const load = useStable((): void => {
     Promise.all([stored_flights(), deleted_flights()]).then(
       ([a, b]) => {
         set_all(a);
         set_bin(b);
+        set_problem('');
       },
       (e: unknown) => set_problem(error_text(e)),
     );
-  };
+  });
   const newest = events.value.filter((e) => e.code.startsWith('mission.')).length;
-  useEffect(load, [newest]);
+  useEffect(load, [newest, load]);
+  useEffect(() => when_back(load), [load]);
   const guarded = async (work: () => Promise<unknown>, done: string): Promise<void> => {
     set_problem('');
     set_sure('');
@@ -86,7 +90,7 @@ export function FlightsPanel() {
           </tr>
         </thead>
         <tbody>
-          {all.map((f) => (
+          {all?.map((f) => (
             <tr key={f.id}>
               <th scope="row">
                 {f.name || f.id.slice(0, 8)}
@@ -123,7 +127,11 @@ export function FlightsPanel() {
           ))}
         </tbody>
       </table>
-      {all.length === 0 && <p class="why">No flight is stored.</p>}
+      {!all?.length && (
+        <Empty loaded={all !== null} failed={problem !== ''}>
+          No flight is stored.
+        </Empty>
+      )}
       {bin.length > 0 && (
         <table class="tbl" data-testid="bin">
           <caption>Deleted flights</caption>

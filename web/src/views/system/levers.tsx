@@ -1,6 +1,7 @@
 /// Lever arms: where the antennas sit on the aircraft, and what the kit has learned of it.
-import { useEffect, useState } from 'preact/hooks';
+import { useState } from 'preact/hooks';
 import { flights as fetch_flights, kit_of, type Flight, type Kit } from '../../api/site';
+import { NotLoaded, useLoad } from '../../ui/empty';
 import { fixed } from '../../ui/format';
 import { Q } from '../../ui/marks';
 
@@ -12,17 +13,19 @@ const POINTS: Record<string, string> = {
 /// Where the UWB antennas sit from the point whose track is flown: of the newest flight, with what its kit has learned of it.
 export function LeverPanel() {
   const [flight, set_flight] = useState<Flight | null | undefined>(undefined),
+    [failed, set_failed] = useState(false),
     [kit, set_kit] = useState<Kit | null>(null);
-  useEffect(() => {
+  useLoad(() => {
     fetch_flights().then(
       (all) => {
         const newest = all.find((f) => f.tags.length > 0) ?? all[0] ?? null;
         set_flight(newest);
+        set_failed(false);
         kit_of(all).then(set_kit, () => undefined);
       },
-      () => set_flight(null),
+      () => set_failed(true),
     );
-  }, []);
+  });
   const arm = kit?.next_flight.lever_up_m;
   const none =
     flight &&
@@ -39,6 +42,7 @@ export function LeverPanel() {
           </span>
         )}
       </div>
+      {flight === undefined && <NotLoaded failed={failed} />}
       {flight === null && <p class="why">They come with a flight; there is none yet.</p>}
       {flight && <p class="why">From {POINTS[flight.track_point] ?? flight.track_point} to each UWB antenna.</p>}
       {none && (

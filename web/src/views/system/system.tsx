@@ -4,6 +4,7 @@ import './system.css';
 import { checks as fetch_checks, version as fetch_version, type Check, type Version } from '../../api/system';
 import { may } from '../../state/session';
 import { system } from '../../state/store';
+import { NotLoaded, useLoad } from '../../ui/empty';
 import { bytes, fixed, grouped } from '../../ui/format';
 import { Chip } from '../../ui/marks';
 import { AccessPanel, AuditPanel } from './access';
@@ -34,18 +35,18 @@ export function System({ part }: { part: string | null }) {
 }
 
 function HealthPanel() {
-  const [list, set_list] = useState<readonly Check[]>([]),
+  const [list, set_list] = useState<readonly Check[] | null>(null),
     [built, set_built] = useState<Version | null>(null),
     value = system.value?.value;
   useEffect(() => {
     const look = (): void => {
-      fetch_checks().then(set_list, () => set_list([]));
+      fetch_checks().then(set_list, () => set_list(null));
     };
     look();
-    fetch_version().then(set_built, () => undefined);
     const timer = setInterval(look, 10_000);
     return () => clearInterval(timer);
   }, []);
+  useLoad(() => void fetch_version().then(set_built, () => undefined));
   return (
     <section class="sys-p" data-testid="health">
       <div class="hd">
@@ -55,13 +56,14 @@ function HealthPanel() {
         </span>
       </div>
       <ul class="checks">
-        {list.map((c) => (
+        {list?.map((c) => (
           <li key={c.name}>
             <Chip shape={c.ok ? 'ok' : 'bad'} tone={c.ok ? 'ok' : 'bad'} word={c.name.toUpperCase()} />
             {!c.ok && <span> {c.text}</span>}
           </li>
         ))}
       </ul>
+      {!list && <NotLoaded />}
       {value && (
         <dl class="kv">
           <div>

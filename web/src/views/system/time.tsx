@@ -4,6 +4,7 @@ import { devices as fetch_devices, type Device } from '../../api/devices';
 import { flights as fetch_flights, kit_of, type Kit } from '../../api/site';
 import { clock_and_drone, type ServerClock } from '../../api/system';
 import type { DroneMsg, OtherOnLink } from '../../live/flight_messages';
+import { NotLoaded } from '../../ui/empty';
 import { age, fixed, percent } from '../../ui/format';
 import { Chip, Mark, Q } from '../../ui/marks';
 
@@ -16,12 +17,16 @@ const ms = (s: number | null): string => fixed(s === null ? null : s * 1000, Mat
 
 export function TimePanel() {
   const [look, set_look] = useState<Look | null>(null),
+    [failed, set_failed] = useState(false),
     [kit, set_kit] = useState<Kit | null>(null);
   useEffect(() => {
     const ask = (): void => {
       Promise.all([clock_and_drone(), fetch_devices()]).then(
-        ([now, devices]) => set_look({ ...now, devices }),
-        () => undefined,
+        ([now, devices]) => {
+          set_look({ ...now, devices });
+          set_failed(false);
+        },
+        () => set_failed(true),
       );
     };
     ask();
@@ -31,7 +36,13 @@ export function TimePanel() {
     const timer = setInterval(ask, 3000);
     return () => clearInterval(timer);
   }, []);
-  if (!look) return null;
+  if (!look)
+    return (
+      <section class="sys-p" data-testid="clocks">
+        <h2>Clocks and aircraft</h2>
+        <NotLoaded failed={failed} />
+      </section>
+    );
   return (
     <>
       <Clocks look={look} kit={kit} />
