@@ -60,7 +60,7 @@ CramerRao cramer_rao(Ranges ranges, int flights, std::uint64_t seed) {
   for (int f = 0; f < flights; ++f) {
     FlightData flight;
     flight.mission.frame = TrackFrame::local;
-    flight.mission.track_point = TrackPoint::tag_antenna;
+    flight.mission.point = TrackPoint::tag_antenna;
     std::array<Eigen::Matrix3d, 8> information;
     information.fill(Eigen::Matrix3d::Zero());
     for (int i = 0; i < k_places; ++i) {
