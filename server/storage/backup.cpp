@@ -122,9 +122,9 @@ Result<void> check_backup(const fs::path& backup) {
 }
 
 Result<std::optional<fs::path>> restore_backup(const fs::path& data_dir, const fs::path& backup) {
+  BOOST_OUTCOME_TRYV(check_backup(backup));  // first: a wrong name makes no folder
   BOOST_OUTCOME_TRY(const auto folder, sql::DataFolder::open(data_dir, 0));
   BOOST_OUTCOME_TRYV(folder->check_rows_are_here());
-  BOOST_OUTCOME_TRYV(check_backup(backup));
   // Copied and synced beside the old one first: whenever the power goes, one whole database has the name or
   // stands beside it under a name that says what it is.
   const fs::path fresh = folder->database().string() + ".restored";

@@ -192,6 +192,9 @@ TEST_F(BackupFiles, AreRefusedWhenTheyAreNotWhatWasBackedUp) {
     return restore_backup(data(), file).error().code;
   };
   EXPECT_EQ(error_of(dir_.path() / "nowhere.db"), Errc::not_found);
+  EXPECT_EQ(restore_backup(dir_.path() / "new" / "data", dir_.path() / "nowhere.db").error().code,
+            Errc::not_found);
+  EXPECT_FALSE(std::filesystem::exists(dir_.path() / "new")) << "a wrong name makes no folder";
   std::ofstream(dir_.path() / "text.db") << std::string(100'000, 'x');
   EXPECT_EQ(error_of(dir_.path() / "text.db"), Errc::unsupported);
   {
