@@ -3,6 +3,32 @@
 #include <CLI/CLI.hpp>
 
 namespace anchord::cli {
+namespace {
+
+/// What an option takes, in the help.
+std::string type_of(const server::Option& option) {
+  using enum server::OptionKind;
+  switch (option.kind) {
+    case count:
+      return "NUMBER";
+    case seconds:
+      return "SECONDS";
+    case metres:
+      return "METRES";
+    case list:
+      return "LIST";
+    case choice:
+      return std::string(option.choices);
+    case database:
+      return "URL";
+    case text:
+    case flag:
+      break;
+  }
+  return "TEXT";
+}
+
+}  // namespace
 
 Result<server::Config> ConfigFlags::load() const {
   std::optional<std::filesystem::path> path;
@@ -15,13 +41,16 @@ std::shared_ptr<ConfigFlags> add_config_flags(CLI::App& command) {
   command.add_option("--config", flags->file, "TOML file with settings");
   for (const auto& option : server::options()) {
     const std::string key(option.key);
-    const std::string help = std::string(option.help) + " [" + std::string(option.default_value) + "]";
+    std::string help(option.help);
+    if (!option.default_value.empty()) help += " [" + std::string(option.default_value) + "]";
     if (option.kind == server::OptionKind::flag) {
       command.add_flag_callback(
           option.flag(), [flags, key] { flags->given[key] = "true"; }, help);
     } else {
-      command.add_option_function<std::string>(
-          option.flag(), [flags, key](const std::string& text) { flags->given[key] = text; }, help);
+      command
+          .add_option_function<std::string>(
+              option.flag(), [flags, key](const std::string& text) { flags->given[key] = text; }, help)
+          ->type_name(type_of(option));
     }
   }
   return flags;
