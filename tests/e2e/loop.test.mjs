@@ -64,6 +64,15 @@ async function on_screen({ page }) {
   });
 }
 /** The page between two looks at the API: each number lies between them, or is one of them where it does not grow. */
+/** Buttons, links and fields of the view that are too small for a finger; words in a sentence may be. */
+const small_targets = (page) =>
+  page.evaluate(() =>
+    [...document.querySelectorAll('main :is(button, a, select, summary, input)')]
+      .filter((e) => e.checkVisibility() && !e.closest('p, label'))
+      .map((e) => [e, e.getBoundingClientRect()])
+      .filter(([, { width, height }]) => width > 0 && (width < 43.5 || height < 43.5))
+      .map(([e, { width, height }]) => `${e.dataset.testid ?? e.textContent}: ${width} x ${height}`),
+  );
 async function compare(view, when) {
   const look = async () => ({
     p: await procedure(),
@@ -175,6 +184,8 @@ test('the checklist is worked off and the flight started, by touch alone', async
   await id('procedure').getByText('RUNNING', { exact: true }).waitFor({ timeout: 20_000 });
   await eventually('anchors are in range', async () => (await procedure()).anchors.length > 3, 60_000, 250);
   await compare(tablet, 'at the first anchors');
+  assert.deepEqual(await small_targets(page), [], 'targets of the tablet');
+  assert.deepEqual(await small_targets(phone.page), [], 'targets of the phone');
   await visitor.id('control').getByText('has control, since').waitFor();
 });
 

@@ -224,7 +224,7 @@ function draw_elevation(
       picture.x(along(bearing_deg, m)),
     taken: Box[] = [...beyond(w, h), { x: 0, y: h - NOTE_PX, w, h: NOTE_PX }];
   axes(c, p, w, h, picture, note(picture, zero));
-  planned(c, p, w, content, picture, s);
+  planned(c, p, w, content, picture, s, taken);
   flown(c, p, content, picture, s);
   const r = p.rem * 0.47,
     at = content.anchors.flatMap((a) => (a.enu_m ? [{ a, x: s(a.enu_m), y: picture.y(a.enu_m[2]) }] : []));
@@ -334,6 +334,7 @@ function planned(
   content: Content,
   picture: Picture,
   s: (m: readonly [number, number]) => number,
+  taken: Box[],
 ): void {
   const f = content.flight,
     k = f?.heights;
@@ -342,6 +343,12 @@ function planned(
     up = (m: number): number => picture.y(zero + m);
   c.save();
   c.font = `400 ${p.rem * 0.75}px ${p.font}`;
+  const name_at = (words: string, x: number, baseline: number): void => {
+    const long = c.measureText(words).width;
+    c.fillStyle = p.ink2;
+    c.fillText(words, x, baseline);
+    taken.push({ x: c.textAlign === 'right' ? x - long : x, y: baseline - p.rem * 0.75, w: long, h: p.rem });
+  };
   for (const [m, name, above] of [
     [k.high_m, 'highest', true],
     [k.low_m, 'lowest', false],
@@ -353,9 +360,8 @@ function planned(
     c.moveTo(40, up(m));
     c.lineTo(w, up(m));
     c.stroke();
-    c.fillStyle = p.ink2;
     c.textAlign = 'right';
-    c.fillText(`${name} ${fixed(m, 1)}`, w - 8, up(m) + (above ? -4 : 13));
+    name_at(`${name} ${fixed(m, 1)} m`, w - 8, up(m) + (above ? -4 : 13));
   }
   c.setLineDash([]);
   if (f.outline.length > 2) {
@@ -371,9 +377,8 @@ function planned(
     c.lineTo(x1, up(k.roof_m));
     c.lineTo(x1, up(0));
     c.stroke();
-    c.fillStyle = p.ink2;
     c.textAlign = 'left';
-    c.fillText(`roof ${fixed(k.roof_m, 1)}`, x0 + 6, up(k.roof_m) + 14);
+    name_at(`roof ${fixed(k.roof_m, 1)} m`, x0 + 6, up(k.roof_m) + 14);
   }
   if (f.waypoints.length) {
     c.strokeStyle = p.ink2;

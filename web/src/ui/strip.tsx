@@ -238,7 +238,7 @@ function read(): Record<'link' | 'rtk' | 'uwb' | 'drone' | 'rec' | 'alarms', Rea
       ...(worst === 'critical' ? look('bad') : worst === 'warning' ? look('caution') : look('off')),
       stale: lost && list.length > 0,
       word: list.length ? String(list.length) : lost ? 'unknown' : 'none',
-      extra: lost && list.length ? 'when last heard' : '',
+      extra: lost && list.length ? 'last known' : '',
       card: list.length ? (
         <ul>
           {list.map((a) => (

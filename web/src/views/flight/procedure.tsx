@@ -1,4 +1,5 @@
 /// Where the flight stands in its procedure and why; where it goes next and what that is worth; the turn and the height search while they run.
+import type { ComponentChildren } from 'preact';
 import '../desk.css';
 import type { GridMsg, ProcedureMsg, ProfileMsg, Step } from '../../live/flight_messages';
 import { current_scene, link, now_ms, tick } from '../../state/store';
@@ -45,14 +46,12 @@ export function Procedure() {
         )}
         <span class="meta">{p.iteration > 0 ? `iteration ${p.iteration}` : p.plan_name}</span>
       </div>
-      <Track step={p.step} />
-      <div class="steps">
-        <Mark shape="estimating" tone="ink" />
-        <span class="cur">
-          {STEP_WORDS[p.step]}
-          {p.step === 'step_to_waypoint' && p.k > 0 && ` (${p.part} of ${p.k})`}
-        </span>
-        <span class={`t cur ${stale ? 'stale' : ''}`}>{since === null ? '' : <Q v={fixed(since, 0)} u="s" />}</span>
+      <Stage
+        step={p.step}
+        part={p.step === 'step_to_waypoint' && p.k > 0 ? ` (${p.part} of ${p.k})` : ''}
+        in_step_s={since}
+        stale={stale}
+      >
         {next && flying(p) && (
           <>
             <Mark shape="off" tone="off" />
@@ -64,7 +63,7 @@ export function Procedure() {
             </span>
           </>
         )}
-      </div>
+      </Stage>
       {p.status === 'aborted' ? (
         <div class="callout bad" role="alert" data-testid="flight-aborted">
           <b>The flight ended before its plan was flown.</b> {sentence(p.ended || p.reason)}
@@ -95,8 +94,37 @@ export function Procedure() {
   );
 }
 
+/// Step and time in it, and how far the flight is; of a flight that is on, or of a moment of a stored one.
+export const Stage = ({
+  step,
+  part = '',
+  in_step_s,
+  stale = false,
+  children,
+}: {
+  step: Step;
+  part?: string;
+  in_step_s: number | null;
+  stale?: boolean;
+  children?: ComponentChildren;
+}) => (
+  <>
+    <Track step={step} />
+    <div class="steps">
+      <Mark shape="estimating" tone="ink" />
+      <span class="cur">
+        {STEP_WORDS[step]}
+        {part}
+      </span>
+      <span class={`t cur ${stale ? 'stale' : ''}`}>
+        {in_step_s === null ? '' : <Q v={fixed(in_step_s, 0)} u="s" />}
+      </span>
+      {children}
+    </div>
+  </>
+);
 /// How far the flight is in its eleven stages.
-export function Track({ step }: { step: Step }) {
+function Track({ step }: { step: Step }) {
   const at = stage_of(step);
   return at < 0 ? null : (
     <div class="track" role="img" aria-label={`Stage ${at + 1} of ${TRACK.length}`}>
@@ -180,7 +208,7 @@ export function NextPoint() {
               <th scope="col" class="num">
                 Height above ground, m
               </th>
-              <th scope="col">Refused</th>
+              <th scope="col">Rejected</th>
             </tr>
           </thead>
           <tbody>

@@ -19,11 +19,11 @@ import {
   link,
 } from '../../state/store';
 import { clock, fixed, told_apart } from '../../ui/format';
-import { Chip, Mark, Q } from '../../ui/marks';
+import { Chip, Mark } from '../../ui/marks';
 import { AnchorCard } from '../anchor_card';
 import '../flight/flight.css';
-import { sentence, Track } from '../flight/procedure';
-import { STATUS_LOOK, STEP_WORDS } from '../flight/words';
+import { sentence, Stage } from '../flight/procedure';
+import { STATUS_LOOK } from '../flight/words';
 import { RangeList } from '../range_list';
 import { not_loaded_words } from '../../ui/empty';
 import { useStable } from '../../ui/use_stable';
@@ -312,14 +312,7 @@ function Then({ player }: { player: Player }) {
             <Chip shape={shape} tone={tone} word={word} />
             <span class="meta">{p.iteration > 0 ? `iteration ${p.iteration}` : ''}</span>
           </div>
-          <Track step={p.step} />
-          <div class="steps">
-            <Mark shape="estimating" tone="ink" />
-            <span class="cur">{STEP_WORDS[p.step]}</span>
-            <span class="t cur">
-              <Q v={fixed((player.t_us - p.since_us) / 1e6, 0)} u="s" />
-            </span>
-          </div>
+          <Stage step={p.step} in_step_s={(player.t_us - p.since_us) / 1e6} />
           {p.reason && <p class="why">{sentence(p.reason)}</p>}
           {p.reached.length > 0 && (
             <details class="notdone">
@@ -331,6 +324,15 @@ function Then({ player }: { player: Player }) {
               </ul>
             </details>
           )}
+        </section>
+      )}
+      {p && p.step !== 'done' && p.step !== 'ready' && (
+        <section class="sec-p" data-testid="replay-next-point">
+          <h2>Next point</h2>
+          <p class="why">
+            No next point is stored with a flight: its candidates are shown while it flies. What was decided is among
+            the events.
+          </p>
         </section>
       )}
     </>
