@@ -118,6 +118,7 @@ struct App::State {
   Result<void> open_drone();
   Result<void> open_broker();
   std::unique_ptr<Backups> make_backups() const;
+  std::vector<api::AlarmCondition> alarms() const;
   void compose();
   Result<void> listen();
 };
@@ -305,6 +306,22 @@ std::unique_ptr<Backups> App::State::make_backups() const {
   return std::make_unique<BackupKeeper>(*database, clock, std::move(keep));
 }
 
+/// Of what only this program knows: rows that left memory, certificates.
+std::vector<api::AlarmCondition> App::State::alarms() const {
+  std::vector<api::AlarmCondition> out;
+  if (const auto lost = devices->rows_lost(); lost > 0)
+    out.push_back({"rows.lost", api::AlarmPriority::critical,
+                   std::to_string(lost) + " rows of devices were not stored since the start; they are in the "
+                                          "recording: anchord replay gives them to the server",
+                   std::nullopt});
+  if (!tls) return out;
+  for (auto& warning : tls_warnings(tls->facts(), tls->failure(), clock.now()))
+    out.push_back({std::move(warning.id),
+                   warning.critical ? api::AlarmPriority::critical : api::AlarmPriority::warning,
+                   std::move(warning.text), std::nullopt});
+  return out;
+}
+
 void App::State::compose() {
   pool =
       std::make_unique<WorkerPool>("anchord-work", config.count("http.workers"), config.count("http.queue"));
@@ -347,21 +364,7 @@ void App::State::compose() {
   deps.log_fault = [](std::string_view request_id, std::string_view what) {
     log(LogLevel::error, "fault in a handler", {{"request_id", request_id}, {"what", what}});
   };
-  deps.server_alarms = [this] {
-    std::vector<api::AlarmCondition> out;
-    if (const auto lost = devices->rows_lost(); lost > 0)
-      out.push_back({"rows.lost", api::AlarmPriority::critical,
-                     std::to_string(lost) +
-                         " rows of devices were not stored since the start; they are in the "
-                         "recording: anchord replay gives them to the server",
-                     std::nullopt});
-    if (!tls) return out;
-    for (auto& warning : tls_warnings(tls->facts(), tls->failure(), clock.now()))
-      out.push_back({std::move(warning.id),
-                     warning.critical ? api::AlarmPriority::critical : api::AlarmPriority::warning,
-                     std::move(warning.text), std::nullopt});
-    return out;
-  };
+  deps.server_alarms = [this] { return alarms(); };
   deps.geopackage = geopackage;
   deps.feature_file = make_geopackage_file;
   deps.spool_dir = emptied_spool(data_dir);

@@ -417,9 +417,8 @@ test('a flight by hand: control, checklist, start, hold, abort', async () => {
   await call('POST', `${path}/aircraft`, { expect: 422, json: { lease } }); // nor a link to one
   await call('GET', `${path}/checklist?plan=${ids.plan}`, { expect: 200 });
   await call('POST', `${path}/checklist`, { expect: 200, json: { plan: ids.plan } });
-  for (const item of ['rtk', 'corrections', 'tag', 'disk', 'props', 'airspace', 'people', 'pilot']) {
+  for (const item of ['rtk', 'corrections', 'tag', 'disk', 'props', 'airspace', 'people', 'pilot'])
     await call('POST', `${path}/checklist/${item}`, { expect: 200, json: { reason: 'contract test' } });
-  }
   await call('POST', `${path}/checklist/recording`, { expect: 422, json: { reason: 'contract test' } });
   await call('POST', `/api/v1/fixes?mission=${ids.flown}`, {
     expect: 200,
