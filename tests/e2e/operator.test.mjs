@@ -139,6 +139,17 @@ test('what was loaded while nothing else was to be done opens during an outage',
   await page.close();
 });
 
+test('a link to a plan, a run or a flight that is not known says so', async () => {
+  const gone = '00000000-0000-4000-8000-000000000000',
+    { page, id } = await openPage(browser, server, { hash: `#/plan/${gone}` });
+  await id('unknown-plan').getByText(`No plan ${gone} is stored here`).waitFor({ timeout: 20_000 });
+  await page.goto(`${server.url}/#/models/runs/${gone}`);
+  await id('unknown-run').getByText(`No training run ${gone} is stored here`).waitFor({ timeout: 20_000 });
+  await page.goto(`${server.url}/#/replay/${gone}`);
+  await page.getByText('No flight is stored under this address').waitFor({ timeout: 20_000 });
+  await page.close();
+});
+
 test('a link to an anchor that is not known says so; one that is known opens it', async () => {
   const { page, id } = await openPage(browser, server, { hash: '#/anchors/0xdead' });
   await live(id);

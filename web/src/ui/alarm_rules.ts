@@ -167,7 +167,7 @@ export function merged(
 }
 
 export const fix_word = (fix: FixClass | null): string =>
-  ({ none: 'NONE', single: 'SINGLE', dgps: 'DGPS', float: 'FLOAT', fixed: 'FIX' })[fix ?? 'none'];
+  ({ none: 'NO FIX', single: 'SINGLE', dgps: 'DGPS', float: 'FLOAT', fixed: 'FIX' })[fix ?? 'none'];
 
 /// Same alarm at most once in 30 s (critical 10 s); a warning sounds once per appearance; muted until a time, or until the next critical.
 export class AlarmLimiter {

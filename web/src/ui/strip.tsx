@@ -130,7 +130,7 @@ function read(): Record<'link' | 'rtk' | 'uwb' | 'drone' | 'rec' | 'alarms', Rea
     rtk: {
       ...(rtk_stale ? { ...rtk_look, tone: 'off' } : rtk_look),
       stale: rtk_stale,
-      word: r ? fix_word(r.fix) : 'NONE',
+      word: fix_word(r?.fix ?? null),
       extra: rtk_stale ? aged(rtk_age) : r?.correction_age_s == null ? '' : `${fixed(r.correction_age_s, 1)} s`,
       card: r ? (
         <>

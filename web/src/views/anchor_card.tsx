@@ -132,7 +132,7 @@ export function Figures({ e, stale }: { e: EstimateMsg; stale: boolean }) {
         <div>
           <dt>Odds, here to mirror</dt>
           <dd class={cls}>
-            {percent(e.probability)} to {percent(e.mirror.probability)}
+            {percent(e.probability)} % to {percent(e.mirror.probability)} %
           </dd>
         </div>
       )}

@@ -235,7 +235,7 @@ function Twin({ r }: { r: AnchorRow }) {
       <span class="n">
         {m.lat !== null ? `${latlon(m.lat)}°, ${latlon(m.lon)}°` : (m.enu_m?.map((x) => metres(x)).join(', ') ?? '–')}
       </span>
-      . Odds {percent(r.probability)} to {percent(m.probability)}.
+      . Odds {percent(r.probability)} % to {percent(m.probability)} %.
     </p>
   );
 }

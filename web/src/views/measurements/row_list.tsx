@@ -1,7 +1,7 @@
 /// The list of measurements: drawn are the rows in sight, kept are the pages about them.
 import { useEffect, useRef, useState } from 'preact/hooks';
 import type { Sample, Source } from '../../api/measurements';
-import { fixed } from '../../ui/format';
+import { fixed, percent } from '../../ui/format';
 import { CLASS_LOOK } from '../../ui/marks';
 import { at_end, known, row, type Rows } from './window';
 
@@ -72,7 +72,7 @@ export function RowList({ source, rows, selected, at, oldest_first, select, look
                 )}
               </th>
               <th scope="col">Label</th>
-              <th scope="col">Predicted</th>
+              <th scope="col">Predicted, P(LOS)</th>
               <th scope="col" class="num">
                 Distance, m
               </th>
@@ -151,7 +151,7 @@ function Line({
         {s.predicted?.p_los == null ? (
           <span class="mut">–</span>
         ) : (
-          `${CLASS_LOOK[s.predicted.cls][2]} ${fixed(s.predicted.p_los, 2)}`
+          `${CLASS_LOOK[s.predicted.cls][2]} ${percent(s.predicted.p_los)} %`
         )}
       </td>
       <td class="num">{fixed(s.distance_m, 3)}</td>

@@ -36,6 +36,7 @@ export function Models({ path }: { path: string | null }) {
     compare,
     address,
     engineer,
+    unknown,
     problem,
     set_problem,
     reload,
@@ -115,6 +116,11 @@ export function Models({ path }: { path: string | null }) {
           </>
         )}
       </div>
+      {unknown && (
+        <div class="problem" role="status" data-testid="unknown-run">
+          <b>No training run {unknown} is stored here.</b> Check the address; another run is shown.
+        </div>
+      )}
       {problem && (
         <div class="problem" role="status">
           <b>That did not work.</b> {problem}{' '}

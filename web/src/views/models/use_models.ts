@@ -1,7 +1,7 @@
 /// What the Models view looks at: the task, its runs and models, the numbers of the chosen run, and what is compared. Follows running jobs.
 import { signal } from '@preact/signals';
 import { useEffect, useState } from 'preact/hooks';
-import { idempotency_key, error_text } from '../../api/client';
+import { ApiError, idempotency_key, error_text } from '../../api/client';
 import {
   models as fetch_models,
   roll_back,
@@ -31,19 +31,24 @@ export function useModels(path: string | null) {
   const [all, set_all] = useState<Loaded | null>(null),
     [page, set_page] = useState<{ run: Run; numbers: RunNumbers } | null>(null),
     [problem, set_problem] = useState(''),
-    [again, set_again] = useState(0);
+    [again, set_again] = useState(0),
+    [unknown, set_unknown] = useState<string | null>(null);
   const reload = (): void => set_again((n) => n + 1);
   useEffect(() => {
     document.title = 'Models - anchord';
   }, []);
   // A deep link names a run, and the run names its task.
   useEffect(() => {
+    set_unknown(null);
     if (wanted)
       void run_page(wanted).then(
         (r) => {
           if (r) task.value = r.task;
+          else set_unknown(wanted);
         },
-        () => undefined,
+        (e: unknown) => {
+          if (e instanceof ApiError && [400, 404, 422].includes(e.problem.status)) set_unknown(wanted);
+        },
       );
   }, [wanted]);
   const of = task.value,
@@ -126,6 +131,7 @@ export function useModels(path: string | null) {
     compare,
     address,
     engineer,
+    unknown,
     problem,
     set_problem,
     reload,

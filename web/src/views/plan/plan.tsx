@@ -39,6 +39,11 @@ export function Plan({ id }: { id: string | null }) {
           <b>That did not work.</b> {problem}
         </div>
       )}
+      {desk.unknown && (
+        <div class="problem" role="status" data-testid="unknown-plan">
+          <b>No plan {desk.unknown} is stored here.</b> Check the address; another plan is shown.
+        </div>
+      )}
       {back_ms !== null && desk.dirty && !theirs && (
         <div class="callout" role="status" data-testid="brought-back">
           <b>Your changes of {age(Date.now() - back_ms)} ago are back.</b> They were not saved when the page was closed.{' '}

@@ -60,6 +60,7 @@ export function usePlan(id: string | null) {
     [origin, set_origin] = useState<Geodetic | null>(null),
     [back_ms, set_back] = useState<number | null>(null),
     [ready, set_ready] = useState(false),
+    [unknown, set_unknown] = useState<string | null>(null),
     [known, set_known] = useState<ReadonlyMap<string, AnchorRow>>(new Map());
   const plan = history.now,
     dirty = plan !== saved,
@@ -75,6 +76,7 @@ export function usePlan(id: string | null) {
     set_theirs(null);
     set_notes([]);
     set_back(null);
+    set_unknown(null);
   };
   /// What was not saved when the page went away is on the drawing again, as one change that can be undone.
   const open_with_draft = (p: PlanDoc): void => {
@@ -112,6 +114,7 @@ export function usePlan(id: string | null) {
             list.find((p) => draft_key(p.id) === last) ??
             (last === draft_key(null) ? EMPTY : list[0]);
         open_with_draft(wanted ?? EMPTY);
+        if (id && !list.some((p) => p.id === id)) set_unknown(id);
         set_problem('');
         set_ready(true);
       },
@@ -213,6 +216,7 @@ export function usePlan(id: string | null) {
     saved,
     dirty,
     ready,
+    unknown,
     able,
     can_undo: history.before.length > 0,
     can_redo: history.after.length > 0,

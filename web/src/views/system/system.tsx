@@ -95,6 +95,10 @@ function HealthPanel() {
             /metrics
           </a>
           ; the interface is described at{' '}
+          <a class="link" href="api/docs" data-testid="api-docs">
+            /api/docs
+          </a>
+          , for programs at{' '}
           <a class="link" href="api/v1/openapi.json">
             /api/v1/openapi.json
           </a>

@@ -210,7 +210,7 @@ function Aircraft({ drone: d }: { drone: DroneMsg | null }) {
           </dl>
           {d.frames_refused > 0 && (
             <div class="callout caution" role="status">
-              <b>{d.frames_refused} frames refused.</b> Unsigned, or signed with another key: somebody else sends on
+              <b>{d.frames_refused} frames rejected.</b> Unsigned, or signed with another key: somebody else sends on
               this link, or the autopilot has not this server&apos;s key.
             </div>
           )}
