@@ -109,12 +109,12 @@ std::string mission_request_json(const Mission& mission) {
 }
 
 void append_ndjson(std::string& body, const Range& row) {
-  body += dumped(range_json(row, std::nullopt));
+  append_range(body, row, std::nullopt, true, {});
   body += '\n';
 }
 
 void append_ndjson(std::string& body, const Fix& row) {
-  body += dumped(fix_json(row, std::nullopt));
+  append_fix(body, row, std::nullopt);
   body += '\n';
 }
 

@@ -10,10 +10,13 @@
 #include "api/measurements/ingest.hpp"
 #include "api/measurements/routes.hpp"
 #include "api/wire/rows_json.hpp"
-#include "core/base/to_wire.hpp"
 #include "core/ports/measurement_store.hpp"
 
 #include <charconv>
+#include <cmath>
+#include <concepts>
+#include <functional>
+#include <utility>
 
 namespace anchord::api {
 
@@ -39,41 +42,68 @@ MeasurementStore::Filter filter_of(const Request& request) {
   return filter;
 }
 
-std::string csv_number(const auto& value) {
-  if (!value) return "";
-  return to_wire(nlohmann::json(*value));
-}
+/// A line of comma-separated cells, its numbers as in JSON.
+class CsvLine {
+ public:
+  explicit CsvLine(std::string& out) : out_(out) {}
+  CsvLine& word(std::string_view text) {
+    if (!std::exchange(first_, false)) out_ += ',';
+    out_ += text;
+    return *this;
+  }
+  CsvLine& number(double value) {
+    word("");
+    append_number(out_, value);
+    return *this;
+  }
+  CsvLine& whole(std::integral auto value) { return word(std::to_string(value)); }
+  CsvLine& number(const std::optional<double>& value) { return value ? number(*value) : nothing(); }
+  template <std::integral Whole>
+  CsvLine& whole(const std::optional<Whole>& value) {
+    return value ? whole(*value) : nothing();
+  }
+  CsvLine& flag(const std::optional<bool>& value) {
+    return value ? word(*value ? "true" : "false") : nothing();
+  }
+  CsvLine& nothing(int cells = 1) {
+    for (; cells > 0; --cells) word("");
+    return *this;
+  }
+  void end() { out_ += "\r\n"; }
+
+ private:
+  std::string& out_;
+  bool first_{true};
+};
 
 constexpr const char* k_range_header =
     "id,t_us,mission,kind,tag,antenna,anchor,seq,distance_m,rss_dbm,fp_dbm,rx_dbm,std_noise,heading_deg,"
     "truth_distance_m,truth_los\r\n";
-std::string range_csv(const Range& r, std::int64_t id) {
+void append_range_csv(std::string& out, const Range& r, std::int64_t id) {
   const RangeTruth truth = r.truth.value_or(RangeTruth{});
-  return std::to_string(id) + ',' + std::to_string(r.time.us()) + ',' + to_string(r.mission) + ',' +
-         std::string(k_range_kind_words.word(r.kind)) + ',' + to_string(r.tag) + ',' +
-         std::to_string(r.antenna) + ',' + to_string(r.anchor) + ',' + csv_number(r.seq) + ',' +
-         to_wire(nlohmann::json(r.distance_m)) + ',' + csv_number(r.rss_dbm) + ',' + csv_number(r.fp_dbm) +
-         ',' + csv_number(r.rx_dbm) + ',' + csv_number(r.std_noise) + ',' + csv_number(r.heading_deg) + ',' +
-         csv_number(truth.distance_m) + ',' + csv_number(truth.los) + "\r\n";
+  CsvLine line(out);
+  line.whole(id).whole(r.time.us()).word(to_string(r.mission)).word(k_range_kind_words.word(r.kind));
+  line.word(to_string(r.tag)).whole(r.antenna).word(to_string(r.anchor)).whole(r.seq);
+  line.number(r.distance_m).number(r.rss_dbm).number(r.fp_dbm).number(r.rx_dbm).number(r.std_noise);
+  line.number(r.heading_deg).number(truth.distance_m).flag(truth.los).end();
 }
 
 constexpr const char* k_fix_header =
     "id,t_us,mission,seq,lon,lat,h_m,x_m,y_m,z_m,fix,sigma_e_m,sigma_n_m,sigma_u_m,correction_age_s,"
     "satellites\r\n";
-std::string fix_csv(const Fix& f, std::int64_t id) {
-  const bool globe = f.frame == TrackFrame::wgs84;
-  const auto number = [](double v) { return to_wire(nlohmann::json(v)); };
-  std::string row = std::to_string(id) + ',' + std::to_string(f.time.us()) + ',' + to_string(f.mission) +
-                    ',' + csv_number(f.seq);
-  row += ',' +
-         (globe ? number(f.position.lon_deg) + ',' + number(f.position.lat_deg) + ',' +
-                      number(f.position.height_m) + ",,,"
-                : ",,," + number(f.local_m.x()) + ',' + number(f.local_m.y()) + ',' + number(f.local_m.z()));
-  row += ',' + std::string(k_fix_words.word(f.fix));
-  for (int i = 0; i < 3; ++i)
-    row +=
-        ',' + (f.covariance_m2 ? number(std::sqrt(std::max(0.0, (*f.covariance_m2)(i, i)))) : std::string());
-  return row + ',' + csv_number(f.correction_age_s) + ',' + csv_number(f.satellites) + "\r\n";
+void append_fix_csv(std::string& out, const Fix& f, std::int64_t id) {
+  CsvLine line(out);
+  line.whole(id).whole(f.time.us()).word(to_string(f.mission)).whole(f.seq);
+  if (f.frame == TrackFrame::wgs84)
+    line.number(f.position.lon_deg).number(f.position.lat_deg).number(f.position.height_m).nothing(3);
+  else
+    line.nothing(3).number(f.local_m.x()).number(f.local_m.y()).number(f.local_m.z());
+  line.word(k_fix_words.word(f.fix));
+  if (f.covariance_m2)
+    for (int i = 0; i < 3; ++i) line.number(std::sqrt(std::max(0.0, (*f.covariance_m2)(i, i))));
+  else
+    line.nothing(3);
+  line.number(f.correction_age_s).whole(f.satellites).end();
 }
 
 /// Streams every page that matches (or `limit` rows where asked for); memory is one page.
@@ -101,7 +131,7 @@ Response stream(const Request& request, MeasurementStore::Filter filter, std::st
       // The status is sent already; an early end is all that can still be told.
       if (!page) throw BodyError(503, page.error().message);
       for (std::size_t i = 0; i < page.value().rows.size(); ++i)
-        out += write(page.value().rows[i], page.value().ids[i]);
+        write(out, page.value().rows[i], page.value().ids[i]);
       state->left -= page.value().rows.size();
       state->filter.after = page.value().next;
       state->done = page.value().next.empty() || state->left == 0;
@@ -111,17 +141,29 @@ Response stream(const Request& request, MeasurementStore::Filter filter, std::st
   return response;
 }
 
-template <class Fetch, class Json, class Csv>
-Response rows(const Request& request, MeasurementStore::Filter filter, Fetch fetch, Json json, Csv csv,
-              const char* header, std::optional<std::uint64_t> total = std::nullopt) {
+/// How a row is written: as a member of a list, and as a line of text.
+template <class Row>
+struct Writers {
+  std::function<Ordered(const Row&, std::int64_t id)> json;
+  std::function<void(std::string&, const Row&, std::int64_t id)> ndjson, csv;
+  const char* csv_header;
+};
+
+template <class Row, class Fetch>
+Response rows(const Request& request, MeasurementStore::Filter filter, Fetch fetch, Writers<Row> writers,
+              std::optional<std::uint64_t> total = std::nullopt) {
   const std::string format = negotiate(request, {"json", "ndjson", "csv"});
-  if (format == "csv") return stream(request, filter, "text/csv; charset=utf-8", header, fetch, csv);
+  if (format == "csv")
+    return stream(request, filter, "text/csv; charset=utf-8", writers.csv_header, fetch, writers.csv);
   if (format == "ndjson")
     return stream(request, filter, "application/x-ndjson", "", fetch,
-                  [json](const auto& row, std::int64_t id) { return to_wire(json(row, id)) + '\n'; });
+                  [write = writers.ndjson](std::string& out, const Row& row, std::int64_t id) {
+                    write(out, row, id);
+                    out += '\n';
+                  });
   const auto page = value_or_problem(fetch(filter));
   Ordered items = Ordered::array();
-  for (std::size_t i = 0; i < page.rows.size(); ++i) items.push_back(json(page.rows[i], page.ids[i]));
+  for (std::size_t i = 0; i < page.rows.size(); ++i) items.push_back(writers.json(page.rows[i], page.ids[i]));
   return list_response(request, std::move(items), page.next, total);
 }
 
@@ -169,30 +211,40 @@ Response list_ranges(MeasurementApi& s, const Request& request) {
   const bool judged = wanted || query_flag(request, "predicted");
   const auto active = judged ? s.models.active() : std::make_shared<const ModelRegistry::Active>();
   filter.with_cir = with_cir || with_features || (judged && active->needs_cir);
-  return rows(
+  const auto asked = [with_features, judged, active](const Range& row) {
+    Ordered out = Ordered::object();
+    if (!with_features && !judged) return out;
+    const auto features = features_of(row);
+    if (with_features) out["features"] = features_json(features);
+    if (judged) out["predicted"] = predicted_json(ModelRegistry::predict(*active, features));
+    return out;
+  };
+  return rows<Range>(
       request, std::move(filter),
       [&store = s.measurements, active, wanted](const MeasurementStore::Filter& page) {
         return wanted ? classed(store, *active, *wanted, page) : store.ranges(page);
       },
-      [with_cir, with_features, judged, active](const Range& row, std::int64_t id) {
-        Ordered json = range_json(row, id);
-        if (with_features || judged) {
-          const auto features = features_of(row);
-          if (with_features) json["features"] = features_json(features);
-          if (judged) json["predicted"] = predicted_json(ModelRegistry::predict(*active, features));
-        }
-        if (!with_cir) json.erase("cir");
-        return json;
-      },
-      range_csv, k_range_header, total);
+      {[with_cir, asked](const Range& row, std::int64_t id) {
+         Ordered json = range_json(row, id);
+         json.update(asked(row));
+         if (!with_cir) json.erase("cir");
+         return json;
+       },
+       [with_cir, asked](std::string& out, const Range& row, std::int64_t id) {
+         append_range(out, row, id, with_cir, asked(row));
+       },
+       append_range_csv, k_range_header},
+      total);
 }
 
 Response list_fixes(MeasurementApi& s, const Request& request) {
   check_query(request, {"limit", "cursor", "fields", "format", "mission", "since", "until", "sort"});
-  return rows(
+  return rows<Fix>(
       request, filter_of(request),
       [&store = s.measurements](const MeasurementStore::Filter& filter) { return store.fixes(filter); },
-      [](const Fix& row, std::int64_t id) { return fix_json(row, id); }, fix_csv, k_fix_header);
+      {[](const Fix& row, std::int64_t id) { return fix_json(row, id); },
+       [](std::string& out, const Fix& row, std::int64_t id) { append_fix(out, row, id); }, append_fix_csv,
+       k_fix_header});
 }
 
 Range one_range(MeasurementApi& s, const Request& request) {

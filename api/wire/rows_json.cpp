@@ -3,12 +3,18 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <charconv>
+#include <cmath>
+#include <concepts>
 #include <cstring>
 #include <nlohmann/json.hpp>
+#include <utility>
 
 #include "api/kit/reader.hpp"
 #include "api/wire/row_limits.hpp"
 #include "core/base/base64.hpp"
+#include "core/base/text.hpp"
+#include "core/base/to_wire.hpp"
 
 namespace anchord::api {
 
@@ -116,8 +122,118 @@ void read_attitude(Fields& fields, Fix& fix) {
   }
 }
 
-void put_if(Ordered& out, const char* key, const auto& value) {
-  if (value) out[key] = *value;
+/// Members of a row, in their order, into a document or straight into text: said once, for both.
+class Document {
+ public:
+  explicit Document(Ordered& out) : out_(out) {}
+  void put(const char* key, const auto& value) { out_[key] = value; }
+  void object(const char* key, const auto& fill) {
+    Ordered inner = Ordered::object();
+    Document members(inner);
+    fill(members);
+    out_[key] = std::move(inner);
+  }
+
+ private:
+  Ordered& out_;
+};
+
+class Text {
+ public:
+  explicit Text(std::string& out) : out_(out) {}
+  void put(std::string_view key, const auto& value) {
+    begin(key);
+    write(value);
+  }
+  void object(std::string_view key, const auto& fill) {
+    begin(key);
+    Text members(out_);
+    fill(members);
+    members.end();
+  }
+  void end() { out_ += first_ ? "{}" : "}"; }
+
+ private:
+  void begin(std::string_view key) {
+    out_ += std::exchange(first_, false) ? "{\"" : ",\"";
+    (out_ += key) += "\":";
+  }
+  void write(double value) { append_number(out_, value); }
+  void write(bool value) { out_ += value ? "true" : "false"; }
+  template <std::integral Whole>
+  void write(Whole value) {
+    std::array<char, 24> text;
+    out_.append(text.data(), std::to_chars(text.data(), text.data() + text.size(), value).ptr);
+  }
+  void write(std::string_view value) { append_json_text(out_, value); }
+  void write(const std::string& value) { append_json_text(out_, value); }  // would be a document as well
+  template <std::size_t N>
+  void write(const std::array<double, N>& values) {
+    for (std::size_t i = 0; i < N; ++i) {
+      out_ += i == 0 ? '[' : ',';
+      write(values[i]);
+    }
+    out_ += ']';
+  }
+  void write(const Ordered& value) { out_ += to_wire(value); }
+
+  std::string& out_;
+  bool first_{true};
+};
+
+void put_if(auto& out, const char* key, const auto& value) {
+  if (value) out.put(key, *value);
+}
+
+void put_range(auto& out, const Range& range, const std::optional<std::int64_t>& id, bool with_cir) {
+  put_if(out, "id", id);
+  out.put("t_us", range.time.us());
+  if (range.received) out.put("received_us", range.received->us());
+  out.put("mission", to_string(range.mission));
+  out.put("kind", k_range_kind_words.word(range.kind));
+  out.put("tag", to_string(range.tag));
+  out.put("antenna", range.antenna);
+  out.put("anchor", to_string(range.anchor));
+  put_if(out, "seq", range.seq);
+  out.put("distance_m", range.distance_m);
+  put_if(out, "rss_dbm", range.rss_dbm);
+  put_if(out, "fp_dbm", range.fp_dbm);
+  put_if(out, "rx_dbm", range.rx_dbm);
+  put_if(out, "std_noise", range.std_noise);
+  put_if(out, "heading_deg", range.heading_deg);
+  if (range.truth) {
+    out.object("truth", [&](auto& truth) {
+      put_if(truth, "distance_m", range.truth->distance_m);
+      put_if(truth, "los", range.truth->los);
+    });
+  }
+  if (range.cir && with_cir) out.put("cir", cir_json(*range.cir));
+}
+
+void put_fix(auto& out, const Fix& fix, const std::optional<std::int64_t>& id) {
+  put_if(out, "id", id);
+  out.put("t_us", fix.time.us());
+  if (fix.received) out.put("received_us", fix.received->us());
+  out.put("mission", to_string(fix.mission));
+  put_if(out, "seq", fix.seq);
+  if (fix.frame == TrackFrame::wgs84) {
+    out.put("lon", fix.position.lon_deg);
+    out.put("lat", fix.position.lat_deg);
+    out.put("h_m", fix.position.height_m);
+  } else {
+    out.put("local_m", std::array{fix.local_m.x(), fix.local_m.y(), fix.local_m.z()});
+  }
+  out.put("fix", k_fix_words.word(fix.fix));
+  if (fix.covariance_m2) {
+    const auto& c = *fix.covariance_m2;
+    out.put("cov_enu_m2", std::array{c(0, 0), c(0, 1), c(0, 2), c(1, 1), c(1, 2), c(2, 2)});
+  }
+  if (fix.enu_from_body) {
+    const auto& q = *fix.enu_from_body;
+    out.put("q", std::array{q.x(), q.y(), q.z(), q.w()});
+  }
+  put_if(out, "correction_age_s", fix.correction_age_s);
+  put_if(out, "satellites", fix.satellites);
 }
 
 }  // namespace
@@ -209,59 +325,42 @@ Fix read_fix(const Json& row, const std::optional<MissionId>& mission, std::vect
   return fix;
 }
 
+void append_number(std::string& out, double value) {
+  if (!std::isfinite(value)) {
+    out += "null";
+    return;
+  }
+  // What dump() calls: std::to_chars writes 7 for 7.0, by which readers tell one kind of number from another.
+  std::array<char, 64> text;
+  out.append(text.data(), nlohmann::detail::to_chars(text.data(), text.data() + text.size(), value));
+}
+
 Ordered range_json(const Range& range, std::optional<std::int64_t> id) {
   Ordered out;
-  put_if(out, "id", id);
-  out["t_us"] = range.time.us();
-  if (range.received) out["received_us"] = range.received->us();
-  out["mission"] = to_string(range.mission);
-  out["kind"] = k_range_kind_words.word(range.kind);
-  out["tag"] = to_string(range.tag);
-  out["antenna"] = range.antenna;
-  out["anchor"] = to_string(range.anchor);
-  put_if(out, "seq", range.seq);
-  out["distance_m"] = range.distance_m;
-  put_if(out, "rss_dbm", range.rss_dbm);
-  put_if(out, "fp_dbm", range.fp_dbm);
-  put_if(out, "rx_dbm", range.rx_dbm);
-  put_if(out, "std_noise", range.std_noise);
-  put_if(out, "heading_deg", range.heading_deg);
-  if (range.truth) {
-    Ordered truth = Ordered::object();
-    put_if(truth, "distance_m", range.truth->distance_m);
-    put_if(truth, "los", range.truth->los);
-    out["truth"] = std::move(truth);
-  }
-  if (range.cir) out["cir"] = cir_json(*range.cir);
+  Document members(out);
+  put_range(members, range, id, true);
   return out;
 }
 
 Ordered fix_json(const Fix& fix, std::optional<std::int64_t> id) {
   Ordered out;
-  put_if(out, "id", id);
-  out["t_us"] = fix.time.us();
-  if (fix.received) out["received_us"] = fix.received->us();
-  out["mission"] = to_string(fix.mission);
-  put_if(out, "seq", fix.seq);
-  if (fix.frame == TrackFrame::wgs84) {
-    out["lon"] = fix.position.lon_deg;
-    out["lat"] = fix.position.lat_deg;
-    out["h_m"] = fix.position.height_m;
-  } else {
-    out["local_m"] = {fix.local_m.x(), fix.local_m.y(), fix.local_m.z()};
-  }
-  out["fix"] = k_fix_words.word(fix.fix);
-  if (fix.covariance_m2) {
-    const auto& c = *fix.covariance_m2;
-    out["cov_enu_m2"] = {c(0, 0), c(0, 1), c(0, 2), c(1, 1), c(1, 2), c(2, 2)};
-  }
-  if (fix.enu_from_body) {
-    const auto& q = *fix.enu_from_body;
-    out["q"] = {q.x(), q.y(), q.z(), q.w()};
-  }
-  put_if(out, "correction_age_s", fix.correction_age_s);
-  put_if(out, "satellites", fix.satellites);
+  Document members(out);
+  put_fix(members, fix, id);
   return out;
+}
+
+void append_range(std::string& out, const Range& range, std::optional<std::int64_t> id, bool with_cir,
+                  const Ordered& rest) {
+  Text members(out);
+  put_range(members, range, id, with_cir);
+  for (const auto& [key, value] : rest.items()) members.put(key, value);
+  members.end();
+}
+
+void append_fix(std::string& out, const Fix& fix, std::optional<std::int64_t> id) {
+  Text members(out);
+  put_fix(members, fix, id);
+  members.end();
 }
 
 std::string cir_bytes(const Cir& cir) {
@@ -277,8 +376,9 @@ std::string cir_bytes(const Cir& cir) {
 
 Ordered cir_json(const Cir& cir) {
   Ordered out{{"n", cir.re_im.size() / 2}, {"dt_ps", cir.dt_ps}};
-  put_if(out, "first_path_idx", cir.first_path_idx);
-  put_if(out, "rxpacc", cir.preamble_count);
+  Document members(out);
+  put_if(members, "first_path_idx", cir.first_path_idx);
+  put_if(members, "rxpacc", cir.preamble_count);
   out["b64"] = base64(cir_bytes(cir));
   return out;
 }

@@ -30,6 +30,14 @@ Fix read_fix(const nlohmann::json& row, const std::optional<MissionId>& mission,
 
 nlohmann::ordered_json range_json(const Range& range, std::optional<std::int64_t> id);
 nlohmann::ordered_json fix_json(const Fix& fix, std::optional<std::int64_t> id);
+/// Their text without a document, byte for byte what to_wire makes of it: rows leave by the million.
+/// rest  members that follow those of the range
+void append_range(std::string& out, const Range& range, std::optional<std::int64_t> id, bool with_cir,
+                  const nlohmann::ordered_json& rest);
+void append_fix(std::string& out, const Fix& fix, std::optional<std::int64_t> id);
+/// A number as to_wire writes it.
+void append_number(std::string& out, double value);
+
 /// {"n", "dt_ps", "first_path_idx", "rxpacc", "b64"}; what is wrong goes to `errors`, under `at`.
 std::optional<Cir> read_cir(const nlohmann::json& value, const std::string& at,
                             std::vector<FieldError>& errors);

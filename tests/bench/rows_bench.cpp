@@ -1,5 +1,5 @@
 // One row of a bulk upload from its text, all checks included: read straight, and through a document as rows
-// with something wrong are.
+// with something wrong are. One row of an export: straight into its text, and through a document.
 #include <benchmark/benchmark.h>
 
 #include <nlohmann/json.hpp>
@@ -7,7 +7,9 @@
 
 #include "api/kit/reader.hpp"
 #include "api/wire/row_parser.hpp"
+#include "api/wire/rows_json.hpp"
 #include "core/base/base64.hpp"
+#include "core/base/to_wire.hpp"
 
 namespace {
 
@@ -48,5 +50,27 @@ void row_read_through_a_document(benchmark::State& state) {
   state.SetBytesProcessed(static_cast<std::int64_t>(state.iterations() * text.size()));
 }
 BENCHMARK(row_read_through_a_document)->ArgName("cir")->Arg(0)->Arg(1);
+
+Range stored() {
+  api::RowParser parser;
+  return parser.range(row(false), k_mission)->range;
+}
+
+void row_written_straight(benchmark::State& state) {
+  const Range range = stored();
+  std::string out;
+  for (auto _ : state) {
+    out.clear();
+    api::append_range(out, range, 4711, false, {});
+    benchmark::DoNotOptimize(out);
+  }
+}
+BENCHMARK(row_written_straight);
+
+void row_written_through_a_document(benchmark::State& state) {
+  const Range range = stored();
+  for (auto _ : state) benchmark::DoNotOptimize(to_wire(api::range_json(range, 4711)));
+}
+BENCHMARK(row_written_through_a_document);
 
 }  // namespace

@@ -76,9 +76,14 @@ export function Publish({ mission }: { mission: MissionMsg }) {
               ? await calibrate(mission.mission, keys.current.calibrate, arm_sigma_m)
               : null;
         if (!solved) throw new Error('This flight is not solved yet: an engineer has to calibrate it first.');
+        // Shown in one go: no anchor is green before it is known what it is held against.
+        const [live, elsewhere] = await Promise.all([
+          live_rows(mission.mission).catch(() => []),
+          moved_since_published(solved.id).catch(() => new Map<string, Moved>()),
+        ]);
+        set_goal(accuracy_goal(live));
+        set_moved(elsewhere);
         set_made(solved);
-        set_goal(accuracy_goal(await live_rows(mission.mission).catch(() => [])));
-        set_moved(await moved_since_published(solved.id).catch(() => new Map<string, Moved>()));
       }),
   );
   useEffect(() => {
