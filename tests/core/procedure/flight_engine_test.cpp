@@ -137,6 +137,15 @@ const std::map<Step, std::function<void(Flown&)>>& ways() {
   return k_ways;
 }
 
+/// One waypoint is measured; then a round with these estimates.
+void measure_one_point(Flown& f, const std::vector<Estimate>& found = {}) {
+  ways().at(Step::ranging)(f);
+  f.hear();
+  f.feed({Trigger::sampled});
+  f.here();
+  f.engine.tick(f.now, found);
+}
+
 struct Fault {
   const char* name;
   std::function<void(Flown&)> happens;
@@ -474,11 +483,7 @@ TEST(FlightEngine, EveryExpectedAnchorIsDoneOnlyWhenItIs) {
     given.exit.max_iterations = 1;
     given.exit.min_iterations = 1;
     Flown f(std::move(given));
-    ways().at(Step::ranging)(f);
-    f.hear();
-    f.feed({Trigger::sampled});
-    f.here();
-    f.engine.tick(f.now, {});
+    measure_one_point(f);
     EXPECT_TRUE(f.engine.state().anchors[0].done);
     EXPECT_EQ(f.engine.state().step, second_is_expected ? Step::go_to_waypoint : Step::return_home)
         << f.engine.state().reason;
@@ -506,11 +511,7 @@ TEST(FlightEngine, AnAnchorIsDoneAtItsOwnTargetWhereItHasOne) {
     if (own_m) given.anchor_target_sigma_m = {{k_anchor, *own_m}};
     given.anchor_target_sigma_m[NetworkId{0x6a22}] = 0.001;  // of another
     Flown f(std::move(given));
-    ways().at(Step::ranging)(f);
-    f.hear();
-    f.feed({Trigger::sampled});
-    f.here();
-    f.engine.tick(f.now, std::vector{estimate});
+    measure_one_point(f, std::vector{estimate});
     const auto& task = f.engine.state().anchors[0];
     EXPECT_EQ(task.reached, reached) << own_m.value_or(0) << ": " << task.why;
     EXPECT_EQ(task.done, reached) << task.why;
@@ -534,11 +535,7 @@ TEST(FlightEngine, AnAnchorIsNotDoneWhileAGateHoldsItBack) {
     given.exit.min_iterations = 1;
     given.exit.target_sigma_m = 0.05;
     Flown f(std::move(given));
-    ways().at(Step::ranging)(f);
-    f.hear();
-    f.feed({Trigger::sampled});
-    f.here();
-    f.engine.tick(f.now, std::vector{estimate});
+    measure_one_point(f, std::vector{estimate});
     EXPECT_EQ(f.engine.state().anchors[0].reached, passed) << f.engine.state().anchors[0].why;
   }
 }
