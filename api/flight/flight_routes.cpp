@@ -91,7 +91,7 @@ Response who_has_control(FlightApi& s, const Request& request) {
   return json_response(200, lease ? lease_json(*lease, false) : Ordered{{"held", false}});
 }
 
-/// The plan that a command's body names; none: refuse_if_any tells.
+/// The plan that the body of a command names; nothing where it names none, which is an error of its fields.
 std::optional<PlanId> plan_of(Fields& fields) {
   const auto text = fields.text("plan", 36, true);
   if (!text) return std::nullopt;

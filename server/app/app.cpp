@@ -306,7 +306,7 @@ std::unique_ptr<Backups> App::State::make_backups() const {
   return std::make_unique<BackupKeeper>(*database, clock, std::move(keep));
 }
 
-/// Of what only this program knows: rows that left memory, certificates.
+/// What only the program knows: rows that left memory before they were stored, certificates that end.
 std::vector<api::AlarmCondition> App::State::alarms() const {
   std::vector<api::AlarmCondition> out;
   if (const auto lost = devices->rows_lost(); lost > 0)

@@ -109,14 +109,14 @@ class SqliteDatabase final : public Database, private sql::Gate {
       health.level =
           status.trouble->failure() == sql::Failure::full ? StorageLevel::full : StorageLevel::unavailable;
       health.reason = status.trouble->what();
+    } else if (damage_found_) {
+      health.level = StorageLevel::unavailable;
+      health.reason = "the check of the database found damage; see the log of the start";
     } else if (status.oldest_s > k_stalled_s) {
       health.level = StorageLevel::stalled;
       health.reason = "the database has not taken a write for " +
                       std::to_string(static_cast<int>(status.oldest_s)) +
                       " s: the disk hangs, or another program holds the database";
-    } else if (damage_found_) {
-      health.level = StorageLevel::unavailable;
-      health.reason = "the check of the database found damage; see the log of the start";
     } else if (free < options_.refuse_free_bytes) {
       health.level = StorageLevel::disk_scarce;
       health.reason = mebibytes(free) + " free on the disk: no new missions";

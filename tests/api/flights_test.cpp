@@ -106,13 +106,14 @@ TEST_F(Flights, StartsHoldsResumesAndLands) {
 /// Two seconds without a position are a hold, ten the way home: an engineer who excludes rows of a long
 /// flight in the air must cause neither.
 TEST_F(Flights, KeepTheirPositionWhileTheirRowsAreReadAgain) {
-  PausableExecutor live;
+  HeldExecutor live;
+  live.holding = false;
   live_ = &live;
   app_.reset();
   database_.reset();
   open();
   const auto lease = take_off();
-  live.paused = true;
+  live.holding = true;
   const auto since = k_unix_us + std::llround(drone_->now * 1e6) - 5'000'000;
   const Json exclusion{{"kind", "fixes"},
                        {"since", since},
@@ -122,7 +123,8 @@ TEST_F(Flights, KeepTheirPositionWhileTheirRowsAreReadAgain) {
   fly(12);
   EXPECT_EQ(drone_->holds, 0);
   EXPECT_EQ(procedure()["status"], "running") << procedure().dump(1);
-  live.go_on();
+  live.holding = false;
+  while (live.run_one()) continue;
   fly(3);
   EXPECT_EQ(drone_->holds, 0) << "what waited in the queue is no news";
   EXPECT_EQ(procedure()["status"], "running") << procedure().dump(1);

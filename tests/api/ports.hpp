@@ -38,10 +38,11 @@ struct NoBackups final : Backups {
   bool due(std::uint64_t) override { return false; }
 };
 
-/// Keeps what is posted until the test runs it.
+/// Keeps what is posted until the test runs it; runs it at once, as InlineExecutor, while it is not holding.
 class HeldExecutor final : public Executor {
  public:
   void post(Task task) override {
+    if (!holding) return task();
     const std::scoped_lock lock(mutex_);
     tasks_.push_back(std::move(task));
   }
@@ -62,6 +63,7 @@ class HeldExecutor final : public Executor {
     task();
     return true;
   }
+  std::atomic<bool> holding{true};
 
  private:
   struct Strand final : Executor {
@@ -72,30 +74,6 @@ class HeldExecutor final : public Executor {
   };
   mutable std::mutex mutex_;
   std::deque<Task> tasks_;
-};
-
-/// Runs what is posted at once, as InlineExecutor, but while it is paused.
-class PausableExecutor final : public Executor {
- public:
-  void post(Task task) override {
-    if (paused) return held_.post(std::move(task));
-    task();
-  }
-  std::unique_ptr<Executor> strand() override { return std::make_unique<Strand>(*this); }
-  void go_on() {
-    paused = false;
-    while (held_.run_one()) continue;
-  }
-  std::atomic<bool> paused{false};
-
- private:
-  struct Strand final : Executor {
-    explicit Strand(PausableExecutor& of) : all(of) {}
-    void post(Task task) override { all.post(std::move(task)); }
-    std::unique_ptr<Executor> strand() override { return all.strand(); }
-    PausableExecutor& all;
-  };
-  HeldExecutor held_;
 };
 
 /// The application with what the sockets' thread does for it: a round of the streams every 50 ms.

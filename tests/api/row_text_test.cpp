@@ -8,6 +8,7 @@
 
 #include "api/wire/rows_json.hpp"
 #include "core/base/to_wire.hpp"
+#include "tests/core/types/full_rows.hpp"
 
 namespace anchord::api {
 namespace {
@@ -28,20 +29,8 @@ std::string line(const Fix& fix) {
 }
 
 Range full_range() {
-  Range r;
-  r.mission = k_mission;
-  r.time = UtcTime::from_us(1'777'889'472'123'456);
-  r.received = UtcTime::from_us(1'777'889'472'143'457);
-  r.tag = {0x6e01};
-  r.antenna = 2;
-  r.anchor = {0xdeadbeef};
-  r.seq = 4'000'000'123;
-  r.distance_m = 0.1 + 0.2;
-  r.rss_dbm = -78.25;
-  r.fp_dbm = -27;
-  r.rx_dbm = -79;
+  Range r = testing::full_range(k_mission);
   r.std_noise = 1e-7;
-  r.heading_deg = 359.99999999;
   r.truth = RangeTruth{7.35, true};
   Cir cir;
   cir.first_path_idx = 744.2;
@@ -77,19 +66,7 @@ TEST(RowText, OfARangeIsWhatItWas) {
 }
 
 TEST(RowText, OfAPositionIsWhatItWas) {
-  Fix f;
-  f.mission = k_mission;
-  f.time = UtcTime::from_us(1'777'889'472'200'000);
-  f.seq = 7;
-  f.position = {48.137154321987, 11.576124123456, 521.1234};
-  f.fix = FixClass::rtk_fixed;
-  Eigen::Matrix3d c;
-  c << 1e-4, 1e-6, -2e-6, 1e-6, 1.1e-4, 3e-6, -2e-6, 3e-6, 4e-4;
-  f.covariance_m2 = c;
-  f.enu_from_body = Eigen::Quaterniond(0.5, 0.5, -0.5, 0.5);
-  f.correction_age_s = 0.7;
-  f.satellites = 21;
-  EXPECT_EQ(line(f),
+  EXPECT_EQ(line(testing::full_fix(k_mission)),
             R"({"id":1,"t_us":1777889472200000,"mission":"0197a3b0-1111-7222-8333-444455556666","seq":7,)"
             R"("lon":11.576124123456,"lat":48.137154321987,"h_m":521.1234,"fix":"fixed",)"
             R"("cov_enu_m2":[0.0001,1e-06,-2e-06,0.00011,3e-06,0.0004],"q":[0.5,-0.5,0.5,0.5],)"

@@ -137,6 +137,18 @@ const std::map<Step, std::function<void(Flown&)>>& ways() {
   return k_ways;
 }
 
+/// The anchor, its position known to this sigma.
+Estimate determined_to(double sigma_m) {
+  Estimate estimate;
+  estimate.anchor = k_anchor;
+  estimate.verdict = Verdict::ok;
+  estimate.best.emplace();
+  estimate.best->position.m = k_place + Vector3d(3, 2, 0);
+  estimate.best->covariance_m2 = Eigen::Matrix3d::Identity() * (sigma_m * sigma_m / 3);
+  estimate.best->probability = 1;
+  return estimate;
+}
+
 /// One waypoint is measured; then a round with these estimates.
 void measure_one_point(Flown& f, const std::vector<Estimate>& found = {}) {
   ways().at(Step::ranging)(f);
@@ -496,13 +508,7 @@ TEST(FlightEngine, EveryExpectedAnchorIsDoneOnlyWhenItIs) {
 }
 
 TEST(FlightEngine, AnAnchorIsDoneAtItsOwnTargetWhereItHasOne) {
-  Estimate estimate;
-  estimate.anchor = k_anchor;
-  estimate.verdict = Verdict::ok;
-  estimate.best.emplace();
-  estimate.best->position.m = k_place + Vector3d(3, 2, 0);
-  estimate.best->covariance_m2 = Eigen::Matrix3d::Identity() * (0.04 * 0.04 / 3);  // sigma 0.04 m
-  estimate.best->probability = 1;
+  const Estimate estimate = determined_to(0.04);
   for (const auto& [own_m, reached] :
        std::vector<std::pair<std::optional<double>, bool>>{{{}, true}, {0.02, false}, {0.06, true}}) {
     auto given = setup();
@@ -522,12 +528,7 @@ TEST(FlightEngine, AnAnchorIsDoneAtItsOwnTargetWhereItHasOne) {
 }
 
 TEST(FlightEngine, AnAnchorIsNotDoneWhileAGateHoldsItBack) {
-  Estimate estimate;
-  estimate.anchor = k_anchor;
-  estimate.verdict = Verdict::ok;
-  estimate.best.emplace();
-  estimate.best->position.m = k_place + Vector3d(3, 2, 0);
-  estimate.best->covariance_m2 = Eigen::Matrix3d::Identity() * 1e-4;
+  Estimate estimate = determined_to(0.02);
   for (const bool passed : {true, false}) {
     estimate.gates = {{"residual_scale", 0.7, 0.6, passed, "1.4826 x median absolute residual, metres"},
                       {k_goal_h95, 0.3, 0.2, false, ""}};  // the flight has a target of its own

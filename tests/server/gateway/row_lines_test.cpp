@@ -7,6 +7,7 @@
 
 #include "api/measurements/row_source.hpp"
 #include "api/wire/rows_json.hpp"
+#include "tests/core/types/full_rows.hpp"
 
 namespace anchord::gateway {
 namespace {
@@ -15,39 +16,8 @@ using Json = nlohmann::json;
 
 const MissionId k_flight{parse_uuid("01890a5d-ac96-774b-bcce-b302099a8057").value()};
 
-Range full_range() {
-  Range r;
-  r.mission = k_flight;
-  r.time = UtcTime::from_us(1'777'889'472'123'456);
-  r.received = UtcTime::from_us(1'777'889'472'143'457);
-  r.tag = {0x6e01};
-  r.antenna = 2;
-  r.anchor = {0xdeadbeef};
-  r.seq = 4'000'000'123;
-  r.distance_m = 0.1 + 0.2;  // needs all its digits
-  r.rss_dbm = -78.25;
-  r.fp_dbm = -81.0 / 3;
-  r.rx_dbm = -79;
-  r.std_noise = 44;
-  r.heading_deg = 359.99999999;
-  return r;
-}
-
-Fix full_fix() {
-  Fix f;
-  f.mission = k_flight;
-  f.time = UtcTime::from_us(1'777'889'472'200'000);
-  f.seq = 7;
-  f.position = {48.137154321987, 11.576124123456, 521.1234};
-  f.fix = FixClass::rtk_fixed;
-  Eigen::Matrix3d c;
-  c << 1e-4, 1e-6, -2e-6, 1e-6, 1.1e-4, 3e-6, -2e-6, 3e-6, 4e-4;
-  f.covariance_m2 = c;
-  f.enu_from_body = Eigen::Quaterniond(0.5, 0.5, -0.5, 0.5);
-  f.correction_age_s = 0.7;
-  f.satellites = 21;
-  return f;
-}
+Range full_range() { return testing::full_range(k_flight); }
+Fix full_fix() { return testing::full_fix(k_flight); }
 
 /// The rows of a CSV batch as the server reads them.
 template <class Read>
