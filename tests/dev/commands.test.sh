@@ -21,9 +21,14 @@ stand_in cmake 'mkdir -p "build/$2"'
 stand_in ninja ''
 stand_in setarch '[[ $2 == -R ]] && shift 2 && exec "$@"'
 stand_in ctest '
-while (($#)); do [[ $1 == --output-junit ]] && junit=$2; shift; done
+says=${CTEST_SAYS:-run}
+while (($#)); do
+  [[ $1 == --output-junit ]] && junit=$2
+  [[ $1$2 == -j1 ]] && says=${CTEST_SAYS_ALONE:-fail}
+  shift
+done
 mkdir -p "${junit%/*}"
-printf "<testcase name=\"One.Two\" status=\"%s\">\n</testcase>\n" "${CTEST_SAYS:-run}" >"$junit"
+printf "<testcase name=\"%s\" status=\"%s\">\n</testcase>\n" "${CTEST_NAME:-One.Two}" "$says" >"$junit"
 echo "options: ubsan=$UBSAN_OPTIONS tsan=$TSAN_OPTIONS"'
 stand_in gcovr '
 while (($#)); do [[ $1 == --csv ]] && csv=$2; shift; done
@@ -49,6 +54,15 @@ CTEST_SAYS=fail run test --tsan
 expect "a test that fails under a sanitizer" 1 'FAILED  One\.Two'
 run test --msan
 expect "a sanitizer that is not there" 1 "dev: test knows --asan .* and --tsan .*; not '--msan'"
+
+CTEST_SAYS=fail CTEST_SAYS_ALONE=run run test --tsan
+expect "only tests of the dashboard are run again" 1 'FAILED  One\.Two'
+CTEST_SAYS=fail CTEST_SAYS_ALONE=run CTEST_NAME=e2e_three run test --tsan
+expect "a test of the dashboard that passes alone" 0 'ALONE   e2e_three: failed beside another test, passed alone.*1 passed, 0 failed'
+called "a test of the dashboard that failed is run again" 'ctest .*-j 1 .*-R \^\(e2e_three\)\$'
+CTEST_SAYS=fail CTEST_NAME=e2e_three run test --tsan
+expect "a test of the dashboard that fails alone too" 1 'FAILED  e2e_three'
+[[ $output != *ALONE* ]] ; pass_or_fail $? "what fails twice did not pass alone" "$output"
 
 run coverage
 expect "coverage by folder" 0 'core +40 +24 +60\.0'
