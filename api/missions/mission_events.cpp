@@ -11,23 +11,19 @@ void MissionService::State::publish_events(Flight& flight, Flight::Work& work) {
     std::visit([&](const auto& one) { publish(flight, one); }, event);
 }
 
-void MissionService::State::publish(Flight& flight, const flight::FixBelieved& event) {
-  {
-    auto inbox = flight.inbox.lock();
-    inbox->believed = event.fix;
-  }
+void MissionService::State::publish(const Flight&, const flight::FixBelieved& event) const {
   if (auto* pilot = observer.load()) pilot->on_fix(event.fix);
 }
 
-void MissionService::State::publish(Flight& flight, const flight::FixShown& event) {
+void MissionService::State::publish(const Flight& flight, const flight::FixShown& event) const {
   const std::int64_t t_us = event.fix.time.us();
   deps.hub.publish(Topic::rtk_status, live_rtk_json(flight.id, event.fix), t_us, to_string(flight.id));
   deps.hub.collect(Topic::fixes, live_fix_json(flight.id, event.fix), t_us);
 }
 
-void MissionService::State::publish(Flight& flight, const flight::PoseMoved& event) {
-  deps.hub.publish(Topic::drone_pose, live_pose_json(flight.id, flight.frame, event.pose),
-                   event.pose.time.us(), to_string(flight.id));
+void MissionService::State::publish(const Flight& flight, const flight::PoseMoved& event) const {
+  deps.hub.publish(Topic::drone_pose, live_pose_json(flight.id, flight.frame, event), event.time.us(),
+                   to_string(flight.id));
 }
 
 void MissionService::State::publish(Flight& flight, const flight::RangeDecided& event) {

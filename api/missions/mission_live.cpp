@@ -39,15 +39,18 @@ void MissionService::State::enqueue(Flight& flight, const R& row, SteadyTime now
   ++queued;
 }
 
-void MissionService::State::tell_pilot(Flight& flight, const Fix& fix) const {
-  auto* pilot = observer.load();
-  if (pilot == nullptr) return;
+void MissionService::State::report_position(Flight& flight, const Fix& fix) {
+  std::vector<flight::PositionEvent> events;
   {
-    auto inbox = flight.inbox.lock();
-    if (!inbox->fix_check || !inbox->fix_check->believes(fix)) return;
-    inbox->believed = fix;
+    auto positions = flight.positions.lock();
+    events = positions->add(fix);
   }
-  pilot->on_fix(fix);
+  for (const auto& event : events) std::visit([&](const auto& one) { publish(flight, one); }, event);
+}
+
+void MissionService::State::share_origin(Flight& flight, const Flight::Work& work) {
+  auto positions = flight.positions.lock();
+  positions->share_origin(work.live.origin());
 }
 
 template <class R>
@@ -59,10 +62,11 @@ void MissionService::State::take_newest(std::span<const R> rows) {
     if (!flight) continue;
     // While it is read back from the store its newest row is not known.
     if (flight->rebuilding) {
-      tell_pilot(*flight, row);
+      report_position(*flight, row);
       continue;
     }
     if (auto inbox = flight->inbox.lock(); !inbox->ahead.take(row)) continue;
+    report_position(*flight, row);
     enqueue(*flight, row, now);
   }
   for (const auto& f : all()) schedule(f);
@@ -78,7 +82,7 @@ void MissionService::State::accept(std::span<const R> rows, std::span<const RowO
     if (outcomes[i] != RowOutcome::accepted) continue;
     // Of several senders of one row the store accepts one: whoever was live with it, it has been had.
     if (auto inbox = flight->inbox.lock(); inbox->ahead.settle(rows[i])) continue;
-    if (flight->rebuilding) tell_pilot(*flight, rows[i]);
+    report_position(*flight, rows[i]);
     enqueue(*flight, rows[i], now);
   }
   for (const auto& f : all()) schedule(f);
@@ -173,8 +177,8 @@ void MissionService::State::work(Flight& flight) {
   }
   if (closing) work->live.finish();
   work->live.settle();
-  work->live.show_pose();
   publish_events(flight, *work);
+  share_origin(flight, *work);
   flight.dirty = true;
   make_view(flight, *work);
 }

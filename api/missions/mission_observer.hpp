@@ -9,7 +9,8 @@ struct RangeResult;
 
 namespace anchord::api {
 
-/// What a mission's live path tells whoever flies by it. on_* are called on the mission's strand: be brief.
+/// What a mission's live path tells whoever flies by it. on_fix is called by the thread that brings the fix,
+/// on_range on the mission's strand: be brief.
 class MissionObserver {
  public:
   virtual ~MissionObserver() = default;

@@ -29,11 +29,6 @@ void MissionService::State::begin_rebuild(const std::shared_ptr<Flight>& flight)
     flight->rebuilding = false;
     return schedule(flight);
   }
-  {
-    auto exclusions = exclusions_of(flight->id);
-    auto inbox = flight->inbox.lock();
-    inbox->fix_check.emplace(flight->frame, deps.track, std::move(exclusions), inbox->believed);
-  }
   start_reading(*flight);
   continue_rebuild(flight);
 }
@@ -58,10 +53,6 @@ void MissionService::State::continue_rebuild(const std::shared_ptr<Flight>& flig
       work->live.end_reading();
     }
     flight->rebuilding = false;
-    {
-      auto inbox = flight->inbox.lock();
-      inbox->fix_check.reset();
-    }
     self->schedule(flight);
   });
 }
@@ -83,6 +74,9 @@ bool MissionService::State::rebuild_slice(Flight& flight) {
       auto inbox = flight.inbox.lock();
       std::visit([&](const auto& row) { inbox->ahead.note(row); }, *stored);
     }
+    if (const auto* fix = std::get_if<Fix>(&*stored);
+        fix != nullptr && (!work->newest_stored || work->newest_stored->time < fix->time))
+      work->newest_stored = *fix;
     const flight::LiveRow row = std::visit([&](auto& one) { return row_of(std::move(one)); }, *stored);
     work->rebuilt.push_back(flight::identity(row));
     work->live.add(row);
@@ -94,6 +88,15 @@ void MissionService::State::end_rebuild(Flight& flight) {
   auto work = flight.work.lock();
   publish_events(flight, *work);
   flight.dirty = true;
+  // After a restart the page shows where the aircraft was last; to the pilot that is no news.
+  std::optional<flight::PoseMoved> pose;
+  {
+    auto positions = flight.positions.lock();
+    positions->share_origin(work->live.origin());
+    if (!positions->pose() && work->newest_stored) (void)positions->add(*work->newest_stored);
+    pose = positions->pose();
+  }
+  if (pose) publish(flight, *pose);
 }
 
 }  // namespace anchord::api

@@ -117,6 +117,10 @@ void MissionService::exclusions_changed(const MissionId& id) {
   }
   {
     auto exclusions = state_->exclusions_of(id);
+    {
+      auto positions = flight->positions.lock();
+      positions->begin_anew(exclusions);
+    }
     auto work = flight->work.lock();
     work->live.begin_anew(std::move(exclusions));
     work->rebuilt.clear();

@@ -13,8 +13,8 @@
 #include "api/missions/stored_rows.hpp"
 #include "api/wire/live_writer.hpp"
 #include "core/base/locked.hpp"
-#include "core/flight/fix_check.hpp"
 #include "core/flight/live_mission.hpp"
+#include "core/flight/position_watch.hpp"
 #include "core/ports/anchor_store.hpp"
 #include "core/ports/exclusion_store.hpp"
 #include "core/ports/executor.hpp"
@@ -32,6 +32,7 @@ struct MissionService::Flight {
         frame(setup.mission.frame),
         strand(std::move(on)),
         inbox(std::in_place, setup.mission),
+        positions(std::in_place, setup.mission, setup.live.track, setup.live.origin, setup.exclusions),
         work(std::in_place, std::move(setup)) {}
   const MissionId id;
   const TrackFrame frame;
@@ -54,12 +55,11 @@ struct MissionService::Flight {
     /// Evicted: rows that found it before are in the store, where the next flight reads them.
     bool gone{false};
     std::optional<SteadyTime> fix_arrival{}, range_arrival{};
-    std::optional<Fix> believed{};                ///< the last one that the pilot was told of
-    std::optional<flight::FixCheck> fix_check{};  ///< of what comes while stored rows are read
     /// Something is still to be done, rows that are read back apart.
     bool busy() const { return scheduled || closing || new_priors || !queue.empty(); }
   };
   Locked<Inbox> inbox;
+  Locked<flight::PositionWatch> positions;  ///< held for one fix; no other lock is taken under it
 
   struct Work {
     explicit Work(flight::LiveMissionSetup setup) : live(std::move(setup)) {}
@@ -67,6 +67,7 @@ struct MissionService::Flight {
     std::chrono::steady_clock::time_point joint_not_before{};
     bool joint_running{false};
     std::unique_ptr<StoredRows> rebuild;  ///< while stored rows are read
+    std::optional<Fix> newest_stored{};   ///< of those read
     /// Identities, sorted at the end, until the queue was worked off once.
     std::vector<std::size_t> rebuilt;
   };
@@ -136,15 +137,18 @@ struct MissionService::State : std::enable_shared_from_this<MissionService::Stat
   void accept(std::span<const R> rows, std::span<const RowOutcome> outcomes);
   template <class R>
   void enqueue(Flight& flight, const R& row, SteadyTime now);
-  /// Past the queue, which waits until what was stored is in: who flies needs to know where the aircraft is.
-  void tell_pilot(Flight& flight, const Fix& fix) const;
-  static void tell_pilot(Flight&, const Range&) {}
+  /// Past the queue, whose strand may solve or read for seconds: where the aircraft is, to the pilot and to
+  /// the page.
+  void report_position(Flight& flight, const Fix& fix);
+  static void report_position(Flight&, const Range&) {}
   /// A write that the live path does not wait for.
   void later(std::function<Result<void>()> write) const {
     deps.late.write(std::move(write), std::chrono::milliseconds(0));
   }
   flight::LiveRow row_of(Range range) const;
   static flight::LiveRow row_of(Fix fix) { return fix; }
+  /// Poses are shown in the frame of the estimates.
+  static void share_origin(Flight& flight, const Flight::Work& work);
   void schedule(const std::shared_ptr<Flight>& flight);
   void work(Flight& flight);
   static std::deque<flight::LiveRow> take_rows(Flight& flight, std::uint64_t& dropped);
@@ -152,9 +156,9 @@ struct MissionService::State : std::enable_shared_from_this<MissionService::Stat
   void note_radios(const flight::LiveRow& row, SteadyTime now);
   /// What the live mission reports, to the world: hub, event log, store, pilot.
   void publish_events(Flight& flight, Flight::Work& work);
-  void publish(Flight& flight, const flight::FixBelieved& event);
-  void publish(Flight& flight, const flight::FixShown& event);
-  void publish(Flight& flight, const flight::PoseMoved& event);
+  void publish(const Flight& flight, const flight::FixBelieved& event) const;
+  void publish(const Flight& flight, const flight::FixShown& event) const;
+  void publish(const Flight& flight, const flight::PoseMoved& event) const;
   void publish(Flight& flight, const flight::RangeDecided& event);
   void publish(Flight& flight, const flight::AnchorFound& event);
   void publish(Flight& flight, const flight::AnchorStatusChanged& event);

@@ -171,7 +171,7 @@ void put_gates(Object& out, const std::vector<Gate>& all) {
 
 }  // namespace
 
-std::string live_pose_json(const MissionId& mission, TrackFrame frame, const LivePose& pose) {
+std::string live_pose_json(const MissionId& mission, TrackFrame frame, const flight::PoseMoved& pose) {
   Object out;
   out.key("mission").text(to_string(mission)).key("t_us").integer(pose.time.us());
   place(out, frame == TrackFrame::wgs84 ? std::optional(pose.fix.position) : std::nullopt);

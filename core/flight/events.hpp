@@ -7,25 +7,13 @@
 
 #include "core/localize/live_flight.hpp"
 #include "core/types/estimate.hpp"
-#include "core/types/fix.hpp"
 
 namespace anchord::flight {
 
 /// What happens in a live mission, in order. Whoever drives it makes of them what the world sees: a
-/// message of a topic, a row of the event log, an input of the procedure.
+/// message of a topic, a row of the event log, an input of the procedure. Where the aircraft is,
+/// PositionWatch tells.
 
-/// A position where the aircraft can have been: whoever flies may steer by it.
-struct FixBelieved {
-  Fix fix;
-};
-/// Five of these a second of measured time: how the rover's solution stands.
-struct FixShown {
-  Fix fix;
-};
-/// Ten of these a second of measured time.
-struct PoseMoved {
-  LivePose pose;
-};
 struct RangeDecided {
   RangeResult result;
 };
@@ -51,8 +39,8 @@ struct FixRejected {
 /// The first positions were no part of the flight: every estimate is in another frame from here on.
 struct OriginMoved {};
 
-using Event = std::variant<FixBelieved, FixShown, PoseMoved, RangeDecided, AnchorFound, AnchorStatusChanged,
-                           AnchorEstimated, FixRejected, OriginMoved>;
+using Event =
+    std::variant<RangeDecided, AnchorFound, AnchorStatusChanged, AnchorEstimated, FixRejected, OriginMoved>;
 
 /// found (no position yet), estimating, ambiguous or converged: within the accuracy goal, and no gate holds
 /// it back (reached_goal).

@@ -9,18 +9,9 @@
 namespace anchord::flight {
 namespace {
 
-constexpr std::int64_t k_pose_interval_us = 100'000;  // 10 Hz of measured time
-constexpr std::int64_t k_fix_interval_us = 200'000;
 constexpr std::size_t k_rate_rows = 100;         // the range rate is that of the newest so many
 constexpr std::size_t k_min_joint_ranges = 100;  // below, the own search of each anchor is as good
 constexpr double k_same_origin_m = 1e-3;
-
-/// Once in each interval of measured time, also where the time went back.
-bool due(std::int64_t now_us, std::int64_t& last_us, std::int64_t interval_us) {
-  if (now_us - last_us < interval_us && now_us >= last_us) return false;
-  last_us = now_us;
-  return true;
-}
 
 }  // namespace
 
@@ -60,22 +51,12 @@ void LiveMission::add(const PredictedRange& judged) {
 void LiveMission::add(const Fix& fix) {
   ++state_.n_fixes;
   watch_.note(fix);
-  bool believed = false;
   if (excluded(setup_.exclusions, fix)) {
     ++state_.n_fixes_excluded;
   } else {
     history_.add(fix);
-    believed = live_.add(fix);
+    live_.add(fix);
   }
-  if (reading_) return;
-  if (believed) events_.emplace_back(FixBelieved{fix});
-  const std::int64_t now_us = fix.time.us();
-  if (due(now_us, last_pose_us_, k_pose_interval_us)) show_pose();
-  if (due(now_us, last_fix_us_, k_fix_interval_us)) events_.emplace_back(FixShown{fix});
-}
-
-void LiveMission::show_pose() {
-  if (auto pose = live_.pose()) events_.emplace_back(PoseMoved{*std::move(pose)});
 }
 
 void LiveMission::use_priors(procedure::FlightPriors priors) {
@@ -145,7 +126,6 @@ void LiveMission::end_reading() {
   live_.hold(false);
   settle();
   reading_ = false;
-  show_pose();
 }
 
 void LiveMission::begin_anew(std::vector<Exclusion> exclusions) {

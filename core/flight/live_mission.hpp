@@ -64,8 +64,6 @@ class LiveMission {
   void use_priors(procedure::FlightPriors priors);
   /// The rows of a batch are in: decided ranges and changed estimates become events.
   void settle();
-  /// Where the drone is, published again.
-  void show_pose();
   /// No more rows: ranges that wait for a fix are rejected, every anchor is solved once more. Then settle().
   void finish() { live_.finish(); }
 
@@ -117,7 +115,6 @@ class LiveMission {
   bool reading_{false}, priors_in_use_{false};
   std::map<std::string, std::size_t> rejections_published_;
   std::map<NetworkId, std::string_view> statuses_;
-  std::int64_t last_pose_us_{0}, last_fix_us_{0};
   std::deque<std::int64_t> range_times_us_;
   std::size_t ranges_since_joint_{0};
   std::vector<Event> events_;

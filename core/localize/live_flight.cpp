@@ -46,7 +46,6 @@ struct LiveFlight::State {
   std::vector<RangeResult> results;
   std::set<NetworkId> changed;
   bool held{false};
-  std::optional<LivePose> pose;
   SeenExchanges seen;  ///< against repeats
 
   State(Mission m, LiveOptions o)
@@ -64,14 +63,6 @@ struct LiveFlight::State {
     // A mission that declares no tags takes any as standing at the track point; one that does knows its own.
     if (mission.tags.empty()) return Eigen::Vector3d::Zero();
     return std::nullopt;
-  }
-
-  /// Where the first tag is; nothing where it hangs off the track point and the attitude is not known.
-  std::optional<Eigen::Vector3d> tag_at(const TrackPose& at) const {
-    const Eigen::Vector3d arm =
-        mission.tags.empty() ? Eigen::Vector3d::Zero() : mission.tags.front().lever_arm_body_m;
-    if (!at.attitude && arm.norm() > 1e-9) return std::nullopt;
-    return interpolate(at, at, at.t_s, arm).position_m;
   }
 
   void refuse(const Range& range, std::string why) {
@@ -239,16 +230,7 @@ struct LiveFlight::State {
     for (const auto& [id, anchor] : anchors) changed.insert(id);
   }
 
-  void follow(const LiveTrack::Change& change, const Fix& fix) {
-    if (change.newest) {
-      const TrackPose& now = *change.newest;
-      LivePose live{
-          {track.epoch()->ns + std::llround(now.t_s * 1e9)}, fix, now.position_m, std::nullopt, tag_at(now)};
-      const double since_s = pose ? seconds_between(pose->time, live.time) : 0;
-      if (since_s > 0 && since_s < 2.0 && !change.rebuilt)
-        live.speed_mps = (now.position_m - pose->enu_m).norm() / since_s;
-      pose = std::move(live);
-    }
+  void follow(const LiveTrack::Change& change) {
     if (change.rebuilt)
       rebuild();
     else if (change.added)
@@ -262,12 +244,7 @@ LiveFlight::~LiveFlight() = default;
 LiveFlight::LiveFlight(LiveFlight&&) noexcept = default;
 LiveFlight& LiveFlight::operator=(LiveFlight&&) noexcept = default;
 
-bool LiveFlight::add(const Fix& fix) {
-  State& s = *state_;
-  const auto change = s.track.add(fix);
-  s.follow(change, fix);
-  return change.believed;
-}
+void LiveFlight::add(const Fix& fix) { state_->follow(state_->track.add(fix)); }
 
 void LiveFlight::add(const Range& range, const std::optional<RangeModel>& model) {
   State& s = *state_;
@@ -317,12 +294,12 @@ void LiveFlight::hold(bool held) {
   State& s = *state_;
   s.held = held;
   if (held) return;
-  s.follow(s.track.settle(), s.pose ? s.pose->fix : Fix{});
+  s.follow(s.track.settle());
   s.solve_all();
 }
 
 void LiveFlight::finish() {
-  state_->follow(state_->track.settle(), state_->pose ? state_->pose->fix : Fix{});
+  state_->follow(state_->track.settle());
   for (auto& [ns, entry] : state_->waiting) state_->set_priors(entry, "outside_track");
   state_->solve_all();
 }
@@ -351,8 +328,6 @@ std::optional<double> LiveFlight::uncorrected_shift_m(NetworkId anchor) const {
   if (!with.best || !without.best) return std::nullopt;
   return (with.best->position.m - without.best->position.m).norm();
 }
-
-std::optional<LivePose> LiveFlight::pose() const { return state_->pose; }
 
 std::optional<Wgs84> LiveFlight::origin() const {
   if (!state_->track.frame()) return std::nullopt;

@@ -32,16 +32,6 @@ struct RangeResult {
   bool used() const { return refused.empty(); }
 };
 
-/// Where the drone is.
-struct LivePose {
-  UtcTime time{};
-  Fix fix;
-  Eigen::Vector3d enu_m{0, 0, 0};  ///< of the track point; local x, y, z in a local frame
-  std::optional<double> speed_mps{};
-  std::optional<Eigen::Vector3d>
-      tag_enu_m{};  ///< of the mission's first tag; absent where nothing says how it hangs
-};
-
 struct LiveOptions {
   FixClass min_fix{FixClass::rtk_fixed};
   double max_gap_s{0.5};            ///< between the two fixes round a range
@@ -76,8 +66,7 @@ class LiveFlight {
   LiveFlight(LiveFlight&&) noexcept;
   LiveFlight& operator=(LiveFlight&&) noexcept;
 
-  /// False where no aircraft could have been there, as far as is known by now: nobody should steer by it.
-  bool add(const Fix& fix);
+  void add(const Fix& fix);
   /// `model`: its correction is taken off and its sigma used, before anything is solved.
   void add(const Range& range, const std::optional<RangeModel>& model = {});
   /// A range a person took out of use: counted as "excluded" and told, nothing else.
@@ -103,7 +92,6 @@ class LiveFlight {
   /// How far an anchor stands from where the same ranges put it without the models. Nothing where no range of
   /// it was corrected.
   std::optional<double> uncorrected_shift_m(NetworkId anchor) const;
-  std::optional<LivePose> pose() const;
   /// Of the ENU numbers; none in a local frame or before the first good fix. Another one when the first
   /// positions turned out to be no part of the flight: every estimate is in the new one then.
   std::optional<Wgs84> origin() const;

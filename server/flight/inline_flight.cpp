@@ -16,7 +16,10 @@ LiveMissionSetup live_setup(const InlineFlight::Setup& setup) {
 }  // namespace
 
 InlineFlight::InlineFlight(Setup setup, Drone& drone)
-    : setup_(std::move(setup)), live_(live_setup(setup_)), operations_(&drone) {}
+    : setup_(std::move(setup)),
+      positions_(setup_.mission, {}, setup_.plan.origin, {}),
+      live_(live_setup(setup_)),
+      operations_(&drone) {}
 
 void InlineFlight::publish_events(const Now& now) {
   for (const auto& event : live_.take_events()) {
@@ -27,7 +30,13 @@ void InlineFlight::publish_events(const Now& now) {
 
 void InlineFlight::step(const Now& now, std::span<const Fix> fixes, std::span<const Range> ranges) {
   for (const auto& range : ranges) live_.add(LiveRow(PredictedRange{range, {}, range.time}));
-  for (const auto& fix : fixes) live_.add(LiveRow(fix));
+  for (const auto& fix : fixes) {
+    for (const auto& event : positions_.add(fix)) {
+      on_position(event);
+      std::visit([&](const auto& e) { take(now, e); }, event);
+    }
+    live_.add(LiveRow(fix));
+  }
   live_.settle();
   publish_events(now);
   const auto& f = flight();

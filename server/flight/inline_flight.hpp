@@ -8,6 +8,7 @@
 
 #include "core/flight/live_mission.hpp"
 #include "core/flight/operations.hpp"
+#include "core/flight/position_watch.hpp"
 
 namespace anchord::flight {
 
@@ -37,6 +38,7 @@ class InlineFlight {
   std::vector<LogEvent> take_log() { return operations_.take_events(); }
   /// Told of each event of the mission, before anything follows from it.
   std::function<void(const Event&)> on_event = [](const Event&) {};
+  std::function<void(const PositionEvent&)> on_position = [](const PositionEvent&) {};
 
  private:
   void publish_events(const Now& now);
@@ -48,6 +50,7 @@ class InlineFlight {
   void take(const Now&, const Other&) {}
 
   Setup setup_;
+  PositionWatch positions_;
   LiveMission live_;
   Operations operations_;
   std::uint64_t priors_{0};

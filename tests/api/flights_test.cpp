@@ -132,6 +132,26 @@ TEST_F(Flights, KeepTheirPositionWhileTheirRowsAreReadAgain) {
   app_.reset();
 }
 
+/// A solve of hundreds of anchors takes as long.
+TEST_F(Flights, KeepTheirPositionWhileEstimatesWait) {
+  HeldExecutor live;
+  live.holding = false;
+  live_ = &live;
+  app_.reset();
+  database_.reset();
+  open();
+  const auto lease = take_off();
+  live.holding = true;
+  fly(12);
+  EXPECT_GT(live.held(), 0U);
+  EXPECT_EQ(drone_->holds, 0);
+  EXPECT_EQ(procedure()["status"], "running") << procedure().dump(1);
+  live.holding = false;
+  while (live.run_one()) continue;
+  EXPECT_EQ(act("land", lease).status, 202);
+  app_.reset();
+}
+
 /// A flight that measures one anchor at (10, 5, 2): the operator who lands finds it solved, once, and not
 /// published.
 class LandedFlights : public Flights {

@@ -135,16 +135,18 @@ TEST_F(MissionLive, CallsAnAnchorConvergedOnlyWithinTheGoal) {
   }
 }
 
-/// Newest estimates told on the hub; waits for the next message, never longer than three minutes.
+/// Newest estimates (or poses, under no anchor) told on the hub; waits for the next message, never longer
+/// than three minutes.
 class Listener {
  public:
-  explicit Listener(api::Hub& hub) : client_(hub, api::Principal{"t", "t", {api::Role::viewer}}) {
+  explicit Listener(api::Hub& hub, const std::string& topic = "anchors.estimates")
+      : client_(hub, api::Principal{"t", "t", {api::Role::viewer}}) {
     client_.on_open([this] {
       const std::scoped_lock lock(mutex_);
       woken_ = true;
       changed_.notify_all();
     });
-    client_.on_text(R"({"op":"sub","id":1,"topic":"anchors.estimates"})");
+    client_.on_text(Json{{"op", "sub"}, {"id", 1}, {"topic", topic}}.dump());
   }
   ~Listener() { client_.on_close(); }
   template <class Enough>
@@ -156,7 +158,7 @@ class Listener {
         if (told["op"] != "snap" && told["op"] != "data") continue;
         const Json& data = told["data"];
         const Json rows = data.is_array() ? data : Json::array({data});
-        for (const auto& estimate : rows) newest[estimate["anchor"].get<std::string>()] = estimate;
+        for (const auto& estimate : rows) newest[estimate.value("anchor", "")] = estimate;
       }
       if (enough(newest)) return true;
       std::unique_lock lock(mutex_);
@@ -172,6 +174,37 @@ class Listener {
   std::condition_variable changed_;
   bool woken_{false};
 };
+
+/// The strand of a mission solves, or reads what was stored, for seconds: the aircraft on the map moves.
+TEST_F(MissionLive, ShowsWhereTheAircraftIsThoughEstimatesWait) {
+  const auto flight = streamed(MadeFlight{});
+  const auto id = mission("local");
+  deliver(id, flight, 0, 30);
+  ASSERT_EQ(live(id).size(), 4U);
+  HeldExecutor later;
+  live_ = &later;
+  restart();
+  Listener listener(app_->hub(), "drone.pose");
+  const auto shown_at = [&](double t_s) {
+    return listener.wait([&](const auto& newest) {
+      return newest.contains("") &&
+             newest.at("")["t_us"].template get<std::int64_t>() > k_start_us + std::llround(t_s * 1e6);
+    });
+  };
+  deliver(id, flight, 30, 60);
+  EXPECT_TRUE(shown_at(59)) << "while stored rows wait to be read";
+  while (later.run_one()) continue;
+  deliver(id, flight, 60, 90);
+  EXPECT_GT(later.held(), 0U);
+  EXPECT_TRUE(shown_at(89)) << "while rows wait to be solved";
+  const auto last = std::ranges::find_if(
+      flight.fixes, [&](const Fix& f) { return f.time.us() + k_start_us == listener.newest[""]["t_us"]; });
+  ASSERT_NE(last, flight.fixes.end());
+  const auto at = listener.newest[""]["enu_m"].get<std::vector<double>>();
+  EXPECT_LT((Eigen::Vector3d(at.at(0), at.at(1), at.at(2)) - last->local_m).norm(), 1e-3);
+  while (later.run_one()) continue;
+  close();
+}
 
 // A flight up and down before one wall: the mirror solution of every anchor is as far in front of it as the
 // anchor is behind, and the own search of a live anchor cannot tell. The outline the site has can, through

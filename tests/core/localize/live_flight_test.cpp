@@ -213,25 +213,6 @@ TEST(LiveFlight, SolvesNothingWhileHeldAndEveryAnchorOnceAfterwards) {
   for (const auto& estimate : live.estimates()) EXPECT_EQ(estimate.verdict, Verdict::ok) << estimate.reason;
 }
 
-TEST(LiveFlight, TellsWhereTheTagIsOnlyWhenTheAttitudeIsKnown) {
-  Mission mission;
-  mission.frame = TrackFrame::local;
-  mission.tags = {{NetworkId{0x6e01}, 0, {0, 0, -0.5}}};
-  LiveFlight live(mission);
-  Fix fix;
-  fix.frame = TrackFrame::local;
-  fix.fix = FixClass::rtk_fixed;
-  fix.time = UtcTime::from_seconds(1);
-  fix.local_m = {1, 2, 3};
-  live.add(fix);
-  EXPECT_FALSE(live.pose()->tag_enu_m);
-  fix.time = UtcTime::from_seconds(2);
-  fix.enu_from_body = Eigen::Quaterniond(0, 1, 0, 0);  // upside down: half a turn about the forward axis
-  live.add(fix);
-  ASSERT_TRUE(live.pose()->tag_enu_m);
-  EXPECT_LT((*live.pose()->tag_enu_m - Eigen::Vector3d(1, 2, 3.5)).norm(), 1e-9);
-}
-
 TEST(LiveFlight, PlacesAnRtkFlightOnTheGlobe) {
   MadeFlight made;
   made.frame = TrackFrame::wgs84;
@@ -241,8 +222,6 @@ TEST(LiveFlight, PlacesAnRtkFlightOnTheGlobe) {
   play(live, flight);
   live.finish();
   ASSERT_TRUE(live.origin());
-  ASSERT_TRUE(live.pose());
-  EXPECT_GT(live.pose()->speed_mps.value(), 0.5);
   for (const auto& e : live.estimates()) {
     ASSERT_TRUE(e.best);
     EXPECT_TRUE(e.best->wgs84);

@@ -144,6 +144,9 @@ class Home {
     flight_.on_event = [this](const flight::Event& event) {
       std::visit([this](const auto& e) { take(e); }, event);
     };
+    flight_.on_position = [this](const flight::PositionEvent& event) {
+      std::visit([this](const auto& e) { take(e); }, event);
+    };
   }
 
   void run(const Tick& tick) {
@@ -174,6 +177,13 @@ class Home {
       for (int i = 0; i < 3; ++i) written += exact(e.estimate.best->position.m[i]);
     written += '\n';
   }
+  void take(const flight::PoseMoved& e) {
+    written += "pose " + std::to_string(e.time.ns);
+    for (int i = 0; i < 3; ++i) written += exact(e.enu_m[i]);
+    written += exact(e.speed_mps.value_or(-1)) + '\n';
+  }
+  void take(const flight::FixBelieved& e) { written += "believed " + std::to_string(e.fix.time.ns) + '\n'; }
+  void take(const flight::FixShown& e) { written += "shown " + std::to_string(e.fix.time.ns) + '\n'; }
   template <class Event>
   void take(const Event&) {
     written += "event " + std::to_string(flight::Event(Event{}).index()) + '\n';
