@@ -7,6 +7,7 @@ import { join } from 'node:path';
 import { after, before, test } from 'node:test';
 import { gzipSync } from 'node:zlib';
 import { chromiumPath, haveChromium, openBrowser, openPage, picture, text, violations } from './browser.mjs';
+import { sizes } from './full_server.mjs';
 import { binary, eventually, run, startServer } from './server.mjs';
 
 const folder = mkdtempSync(join(tmpdir(), 'anchord e2e '));
@@ -163,30 +164,31 @@ test('a simulated flight converges on screen, and what is published is what the 
   await page.close();
 });
 
-test('everything is reached by the keyboard, and letters stay letters in a field', async () => {
-  const { page, id } = await openPage(browser, flown);
-  await id('live').waitFor();
-  await page.keyboard.press('3');
-  await id('anchors').waitFor();
-  await page.keyboard.press('/');
-  await page.keyboard.type('13t');
-  assert.equal(await id('filter').inputValue(), '13t');
-  assert.equal(await page.locator('html').getAttribute('data-theme'), 'light');
-  await page.keyboard.press('Escape');
-  await id('filter').fill('');
-  await page.keyboard.press('Escape');
-  await page.keyboard.press(']');
-  const first = await text(id('anchor-detail').locator('h2'));
-  await page.keyboard.press(']');
-  assert.notEqual(await text(id('anchor-detail').locator('h2')), first);
-  await page.keyboard.press('?');
-  await id('help').waitFor();
-  await page.keyboard.press('Escape');
-  await id('help').waitFor({ state: 'detached' });
-  await page.keyboard.press('t');
-  assert.equal(await page.locator('html').getAttribute('data-theme'), 'dark');
-  await page.close();
-});
+for (const [size, width, height] of sizes)
+  test(`everything is reached by the keyboard, and letters stay letters in a field, ${size}`, async () => {
+    const { page, id } = await openPage(browser, flown, { width, height });
+    await id('live').waitFor();
+    await page.keyboard.press('3');
+    await id('anchors').waitFor();
+    await page.keyboard.press('/');
+    await page.keyboard.type('13t');
+    assert.equal(await id('filter').inputValue(), '13t');
+    assert.equal(await page.locator('html').getAttribute('data-theme'), 'light');
+    await page.keyboard.press('Escape');
+    await id('filter').fill('');
+    await page.keyboard.press('Escape');
+    await page.keyboard.press(']');
+    const first = await text(id('anchor-detail').locator('h2'));
+    await page.keyboard.press(']');
+    assert.notEqual(await text(id('anchor-detail').locator('h2')), first);
+    await page.keyboard.press('?');
+    await id('help').waitFor();
+    await page.keyboard.press('Escape');
+    await id('help').waitFor({ state: 'detached' });
+    await page.keyboard.press('t');
+    assert.equal(await page.locator('html').getAttribute('data-theme'), 'dark');
+    await page.close();
+  });
 
 test('a server that goes silent is late, then lost with an alarm while a flight runs, and resumes without doubles', async () => {
   const server = await startServer({ auth: 'off' });

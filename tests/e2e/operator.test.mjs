@@ -6,6 +6,7 @@ import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { after, before, test } from 'node:test';
 import { openBrowser, openPage, picture, text, violations } from './browser.mjs';
+import { sizes } from './full_server.mjs';
 import { binary, eventually, run, startServer } from './server.mjs';
 
 const folder = mkdtempSync(join(tmpdir(), 'anchord e2e ')),
@@ -220,21 +221,24 @@ test('who may only look sees no tool that he may not use', async () => {
     await id('token').fill(token);
     await id('sign-in-submit').click();
     await id('sign-in').waitFor({ state: 'detached' });
-    for (const view of ['plan', 'live', 'anchors', 'measurements', 'models', 'system']) {
-      await id(`nav-${view}`).click();
-      await id(view === 'live' ? 'first-run' : view)
-        .first()
-        .waitFor();
-      for (const tool of [
-        /^(Undo|Import|New|Outline|Generate|Save|Draw here|Expect)$/,
-        /Review and publish|Promote|Exclude|Label|Discover|Add a device|Take control/,
-      ])
-        assert.equal(await page.getByRole('button', { name: tool }).count(), 0, `${view}: ${tool}`);
+    for (const [size, width, height] of sizes) {
+      await page.setViewportSize({ width, height });
+      for (const view of ['plan', 'live', 'anchors', 'measurements', 'models', 'system']) {
+        await id(`nav-${view}`).click();
+        await id(view === 'live' ? 'first-run' : view)
+          .first()
+          .waitFor();
+        for (const tool of [
+          /^(Undo|Import|New|Outline|Generate|Save|Draw here|Expect)$/,
+          /Review and publish|Promote|Exclude|Label|Discover|Add a device|Take control/,
+        ])
+          assert.equal(await page.getByRole('button', { name: tool }).count(), 0, `${size}, ${view}: ${tool}`);
+      }
+      await id('nav-plan').click();
+      await id('plan').waitFor();
+      const fields = page.locator('main :is(input, textarea):enabled:not([readonly])').filter({ visible: true });
+      assert.equal(await fields.count(), 0, `a plan to look at, ${size}`);
     }
-    await id('nav-plan').click();
-    await id('plan').waitFor();
-    const fields = page.locator('main :is(input, textarea):enabled:not([readonly])').filter({ visible: true });
-    assert.equal(await fields.count(), 0, 'a plan to look at');
     await page.close();
     await browser.context.clearCookies();
   } finally {

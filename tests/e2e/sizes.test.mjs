@@ -18,7 +18,7 @@ after(async () => {
 });
 
 for (const [size, width, height] of sizes)
-  test(`models, measurements, replay, review and plan work, ${size}`, async () => {
+  test(`models, measurements, replay, review and plan work, and no other host is asked, ${size}`, async () => {
     const { page, seen, id } = await openPage(browser, server, { width, height, hash: '#/models' }),
       press = (name) => (width < 1000 ? id(name).tap() : id(name).click()),
       open = async (view) => {
@@ -69,6 +69,8 @@ for (const [size, width, height] of sizes)
       }
     await open('plan');
     await page.getByRole('button', { name: 'Discard them' }).click();
+    // F1: all of it without the internet.
+    assert.deepEqual([...seen.hosts], [new URL(server.url).host]);
     assert.deepEqual(seen.errors, []);
     await page.close();
   });
@@ -90,22 +92,28 @@ test('in forced colours nothing is lost: states have shape and word, buttons an 
   await page.close();
 });
 
-test('a server that was killed and started again: the page is back by itself, with what is there now', async () => {
-  const { page, id } = await openPage(browser, server);
-  const live = () => eventually('LIVE', async () => (await text(id('status-link'))).includes('LIVE'), 20_000);
-  await live();
+test('a server that was killed and started again: every page is back by itself, with what is there now', async () => {
+  const pages = [];
+  for (const [, width, height] of sizes) pages.push(await openPage(browser, server, { width, height }));
+  const all = (look) => Promise.all(pages.map(look));
+  const live = ({ id }) => eventually('LIVE', async () => (await text(id('status-link'))).includes('LIVE'), 30_000);
+  await all(live);
   await server.kill();
-  await id('alarm-link.lost').or(id('status-link').getByText('LOST')).first().waitFor({ timeout: 20_000 });
+  await all(({ id }) =>
+    id('alarm-link.lost').or(id('status-link').getByText('LOST')).first().waitFor({ timeout: 30_000 }),
+  );
   await server.start();
-  await live();
+  await all(live);
   const made = await server.fetch('/api/v1/missions', {
     json: { name: 'After the restart', frame: 'wgs84', track_point: 'tag_antenna' },
   });
   assert.equal(made.status, 201);
-  await eventually(
-    'the flight that began after it is in the page',
-    async () => (await page.getByText('After the restart').count()) > 0,
-    20_000,
+  await all(({ page }) =>
+    eventually(
+      'the flight that began after it is in the page',
+      async () => (await page.getByText('After the restart').count()) > 0,
+      30_000,
+    ),
   );
-  await page.close();
+  await all(({ page }) => page.close());
 });
