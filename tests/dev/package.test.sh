@@ -73,7 +73,7 @@ for package in $(awk '{sub(/#.*/, "")} $2 == "@runtime" {print $1}' .ci/packages
   grep -q "^$package " <<<"$named" ; pass_or_fail $? "the SBOM does not name $package"
 done
 texts=$(zcat "$doc/licences.txt.gz")
-for inside in libboost1.81-dev libeigen3-dev libceres-dev libsqlitecpp-dev nlohmann-json3-dev ol preact uplot @preact/signals; do
+for inside in libboost1.81-dev libeigen3-dev libceres-dev libsqlitecpp-dev nlohmann-json3-dev ol papaparse preact uplot @preact/signals; do
   grep -q "^$inside " <<<"$named" ; pass_or_fail $? "the SBOM does not name $inside"
   grep -qE "^$inside [^ ]+ \(in the (executable|dashboard)\)" <<<"$texts" ; pass_or_fail $? "no licence text of $inside"
 done

@@ -73,13 +73,11 @@ test('a flight whose columns have other names is imported by saying what they ar
     writeFileSync(path, `${out.join('\n')}\n`);
     return path;
   };
-  const track = rename('track.csv', {
-    t_s: 'moment',
-    lat_deg: 'phi',
-    lon_deg: 'lambda',
-    alt_m: 'ell_h',
-    fix: 'quality',
-  });
+  const track = rename(
+    'track.csv',
+    { t_s: 'moment', lat_deg: 'phi', lon_deg: 'lambda', alt_m: 'ell_h', fix: 'quality' },
+    (cells) => [...cells.slice(0, 4), { fixed: '4', float: '5', single: '1' }[cells[4]]],
+  );
   const ranges = rename('ranges.csv', { t_s: 'moment', anchor_id: 'who', range_m: 'dist_mm' }, ([t, a, r]) => [
     t,
     a,
@@ -107,6 +105,8 @@ test('a flight whose columns have other names is imported by saying what they ar
   ])
     await where.getByTestId(`column-of-${field}`).selectOption(column);
   await id('import-tag').fill('0x6e01');
+  assert.equal(await id('import-send').isEnabled(), false, 'nobody said what 4 means');
+  await id('fix-numbers').selectOption('nmea');
   for (const [field, value] of [
     ['Forward, m', '0.12'],
     ['Up, m', '-0.28'],
@@ -138,6 +138,93 @@ test('a flight whose columns have other names is imported by saying what they ar
   writeFileSync(wrong, '1,2\n3,4\n');
   await page.getByLabel('Flight files').setInputFiles(wrong);
   await id('import-problem').getByText('a header line of names is needed').waitFor();
+  assert.deepEqual(seen.errors, []);
+  await page.close();
+});
+
+test('a flight out of a German spreadsheet, its anchors with names, gives the anchors of the same flight folder', async () => {
+  const { page, seen, id } = await openPage(browser, server, { hash: '#/import' }),
+    take = async (...files) => {
+      await page.goto(`${server.url}/?theme=light#/import`);
+      await id('dropzone').waitFor();
+      await page.getByLabel('Flight files').setInputFiles(files);
+      await id('mapping').waitFor();
+    },
+    sent = async (name) => {
+      await id('import-name').fill(name);
+      await id('import-send').click();
+      await eventually(
+        `${name} is in`,
+        async () => (await get('/api/v1/missions')).items.some((m) => m.name === name && m.state === 'finished'),
+        60_000,
+      );
+      const { id: mission } = (await get('/api/v1/missions')).items.find((m) => m.name === name);
+      const { id: made } = await (
+        await server.fetch('/api/v1/calibrations', { json: { missions: [mission] }, headers: { prefer: 'wait=60' } })
+      ).json();
+      return (await get(`/api/v1/calibrations/${made}`)).anchors;
+    },
+    of = (name) => {
+      const [head, ...rows] = readFileSync(join(folder, 'flight', name), 'utf8')
+        .trim()
+        .split('\n');
+      return rows.map((row) => Object.fromEntries(row.split(',').map((cell, i) => [head.split(',')[i], cell])));
+    },
+    epoch_ms = Date.parse(JSON.parse(readFileSync(join(folder, 'flight', 'flight.json'), 'utf8')).epoch_utc),
+    moment = (t_s) =>
+      `${new Date(epoch_ms + 1000 * Math.floor(Number(t_s))).toISOString().slice(0, 19).replace('T', ' ')},${(Number(t_s) % 1).toFixed(6).slice(2)}`,
+    comma = (text) => text.replace('.', ','),
+    sheet = (name, heads, rows) => {
+      const path = join(folder, name);
+      writeFileSync(path, `\ufeff${[heads, ...rows].map((cells) => cells.join(';')).join('\r\n')}\r\n`);
+      return path;
+    };
+  await take(...['flight.json', 'track.csv', 'ranges.csv'].map((f) => join(folder, 'flight', f)));
+  const before = await sent('As a folder');
+  const track = sheet(
+      'GNSS.csv',
+      ['Zeit', 'Breite', 'Länge', 'Höhe', 'Qualität', 'hAcc', 'vAcc', 'qx', 'qy', 'qz', 'qw'],
+      of('track.csv').map((r) => [
+        moment(r.t_s),
+        comma(r.lat_deg),
+        comma(r.lon_deg),
+        comma(r.alt_m),
+        { fixed: 'RTK fixed', float: 'RTK float' }[r.fix] ?? r.fix,
+        ...['sd_h_m', 'sd_v_m', 'qx', 'qy', 'qz', 'qw'].map((c) => comma(r[c])),
+      ]),
+    ),
+    ranges = sheet(
+      'Abstand.csv',
+      ['Zeit', 'Anker', 'Abstand'],
+      of('ranges.csv').map((r) => [moment(r.t_s), `Säule ${r.anchor_id}`, comma(r.range_m)]),
+    );
+  await take(track, ranges);
+  await id('mapping')
+    .locator('details')
+    .first()
+    .evaluate((d) => (d.open = true));
+  await id('column-of-fix').selectOption('Qualität');
+  await id('import-tag').fill('0x6e01');
+  for (const [field, value] of [
+    ['Forward, m', '0,12'],
+    ['Up, m', '-0,28'],
+  ]) {
+    await page.getByLabel(field).fill(value);
+    await page.getByLabel(field).blur();
+  }
+  await picture(page, 'import-spreadsheet-light');
+  const after = await sent('As a spreadsheet');
+  assert.equal(after.length, before.length);
+  const names = new Map(
+    await Promise.all(
+      after.map(async (a) => [(await get(`/api/v1/anchors/${a.network_id}`)).properties.name, a.enu_m]),
+    ),
+  );
+  for (const { network_id, enu_m } of before) {
+    const same = names.get(`Säule ${network_id}`);
+    assert.ok(same, `${network_id}: ${[...names.keys()]}`);
+    assert.ok(Math.hypot(...same.map((x, i) => x - enu_m[i])) < 0.02, `${network_id}: ${same} beside ${enu_m}`);
+  }
   assert.deepEqual(seen.errors, []);
   await page.close();
 });

@@ -9,6 +9,7 @@ export interface Sent {
   readonly accepted: number;
   readonly rejected: number;
   readonly first_reason: string;
+  readonly unnamed: number; ///< anchors whose names could not be kept
 }
 
 /// What became of rows. Where not one was taken it comes as a problem (422) with the same members.
@@ -26,6 +27,7 @@ export async function send_flight(
   mission: Wire<'MissionCreate'>,
   fixes: readonly object[],
   ranges: readonly object[],
+  names: ReadonlyMap<string, string>,
   progress: (share: number) => void,
 ): Promise<Sent> {
   const { body } = await call('post', '/missions', {
@@ -66,5 +68,20 @@ export async function send_flight(
       headers: { 'Idempotency-Key': idempotency_key() },
     });
   }
-  return { mission: body.id, accepted, rejected, first_reason };
+  return { mission: body.id, accepted, rejected, first_reason, unnamed: await name_anchors(names) };
+}
+
+/// Names that the files have for anchors, where a person has given none here. How many could not be kept.
+async function name_anchors(names: ReadonlyMap<string, string>): Promise<number> {
+  let unnamed = 0;
+  for (const [id, name] of names) {
+    try {
+      const { body, etag } = await call('get', '/anchors/{id}', { path: { id } });
+      if (body.properties.name) continue;
+      await call('patch', '/anchors/{id}', { path: { id }, body: { name }, headers: { 'If-Match': etag } });
+    } catch {
+      unnamed++;
+    }
+  }
+  return unnamed;
 }

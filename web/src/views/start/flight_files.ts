@@ -1,146 +1,21 @@
-/// A flight from files: tables of track and ranges, columns told by their names or by a person, as rows of the API. docs/formats.md. No DOM.
+/// A flight from files: tables of track and ranges, their columns told by name or by a person, as rows of the API. docs/formats.md. No DOM.
 import type { Wire } from '../../api/contract';
 import { num, obj, str } from '../../live/messages';
-
-export interface Table {
-  readonly name: string;
-  readonly columns: readonly string[];
-  readonly rows: readonly (readonly string[])[];
-}
-const MAX_ROWS = 2_000_000;
-
-/// Comma, semicolon or tab; a header line of names, no quotes. Error: what is wrong and in which line.
-export function table_of(name: string, text: string): Table {
-  const lines = text.split(/\r?\n/).filter((l) => l.trim() !== '' && !l.startsWith('#')),
-    head = lines[0] ?? '',
-    comma = [',', ';', '\t'].reduce((a, b) => (head.split(b).length > head.split(a).length ? b : a)),
-    columns = head.split(comma).map((c) => c.trim());
-  if (lines.length < 2) throw new Error(`${name}: a header line and at least one row are needed`);
-  if (lines.length > MAX_ROWS) throw new Error(`${name}: ${lines.length} rows, at most ${MAX_ROWS}`);
-  if (columns.every((c) => c !== '' && Number.isFinite(Number(c))))
-    throw new Error(`${name}: the first line is numbers, a header line of names is needed`);
-  const rows = lines.slice(1).map((l, i) => {
-    const cells = l.split(comma).map((c) => c.trim());
-    if (cells.length !== columns.length)
-      throw new Error(`${name} line ${i + 2}: ${cells.length} cells, the header has ${columns.length}`);
-    return cells;
-  });
-  return { name, columns, rows };
-}
-
-/// What a column can be. Without those marked `needed` there is no flight.
-export const TRACK_FIELDS = ['time', 'lat', 'lon', 'height', 'x', 'y', 'z', 'fix', 'sigma_h', 'sigma_v'] as const;
-export const RANGE_FIELDS = ['time', 'anchor', 'range', 'tag', 'rss', 'rx', 'fp', 'seq'] as const;
-export type TrackField = (typeof TRACK_FIELDS)[number] | 'age' | 'satellites' | 'heading' | 'qx' | 'qy' | 'qz' | 'qw';
-export type RangeField = (typeof RANGE_FIELDS)[number] | 'antenna' | 'kind';
-export type Field = TrackField | RangeField;
-export type Columns = Readonly<Partial<Record<Field, string>>>;
-export const FIELD_WORDS: Record<(typeof TRACK_FIELDS)[number] | (typeof RANGE_FIELDS)[number], string> = {
-  time: 'Time',
-  lat: 'Latitude, °',
-  lon: 'Longitude, °',
-  height: 'Height above ellipsoid, m',
-  x: 'x, m',
-  y: 'y, m',
-  z: 'z, m',
-  fix: 'Fix class',
-  sigma_h: 'σ horizontal, m',
-  sigma_v: 'σ vertical, m',
-  anchor: 'Anchor',
-  range: 'Range',
-  tag: 'Tag',
-  rss: 'RSS, dBm',
-  rx: 'Receive power, dBm',
-  fp: 'First path power, dBm',
-  seq: 'Number of the row',
-};
-const NAMES: Readonly<Record<Field, readonly string[]>> = {
-  time: [
-    't_s',
-    't_us',
-    't_ms',
-    'time',
-    'time_ms',
-    'time_utc',
-    'timestamp',
-    't',
-    'utc',
-    'gps_time',
-    'time_s',
-    'time_us',
-    'unix',
-    'datetime',
-  ],
-  lat: ['lat_deg', 'lat', 'latitude'],
-  lon: ['lon_deg', 'lon', 'lng', 'longitude'],
-  height: ['alt_m', 'h_m', 'height_m', 'alt', 'altitude', 'height', 'ellipsoidal_height'],
-  x: ['x_m', 'x', 'e_m', 'east', 'east_m'],
-  y: ['y_m', 'y', 'n_m', 'north', 'north_m'],
-  z: ['z_m', 'z', 'u_m', 'up', 'up_m'],
-  fix: ['fix', 'fix_type', 'quality', 'rtk'],
-  sigma_h: ['sd_h_m', 'sigma_h_m', 'hacc', 'h_acc', 'sd_h'],
-  sigma_v: ['sd_v_m', 'sigma_v_m', 'vacc', 'v_acc', 'sd_v'],
-  age: ['correction_age_s', 'age_s', 'age'],
-  satellites: ['satellites', 'sats', 'num_sv'],
-  heading: ['heading_deg', 'heading', 'yaw_deg', 'yaw'],
-  qx: ['qx'],
-  qy: ['qy'],
-  qz: ['qz'],
-  qw: ['qw'],
-  anchor: ['anchor_id', 'anchor', 'anchor_address', 'remote', 'remote_id', 'dest', 'destination'],
-  range: ['range_m', 'distance_m', 'range', 'distance', 'dist', 'range_mm', 'distance_mm', 'dist_m', 'dist_mm'],
-  tag: ['tag_id', 'tag', 'tag_address', 'source', 'local_id'],
-  rss: ['rss_dbm', 'rss', 'rssi'],
-  rx: ['rx_dbm', 'rx_power', 'rx'],
-  fp: ['fp_dbm', 'fp_power', 'first_path_dbm'],
-  seq: ['seq', 'sequence'],
-  antenna: ['antenna'],
-  kind: ['kind'],
-};
-const plain = (s: string): string =>
-  s
-    .toLowerCase()
-    .replaceAll(/[^a-z0-9]+/g, '_')
-    .replace(/^_|_$/g, '');
-
-/// The columns by their names, the usual name of a field first.
-export function guessed(t: Table, fields: readonly Field[]): Columns {
-  const by_name = new Map(t.columns.map((c) => [plain(c), c])),
-    out: Partial<Record<Field, string>> = {};
-  for (const f of fields) {
-    const name = NAMES[f].find((n) => by_name.has(n));
-    if (name) out[f] = by_name.get(name)!;
-  }
-  return out;
-}
-export const guessed_track = (t: Table): Columns =>
-  guessed(t, [...TRACK_FIELDS, 'age', 'satellites', 'heading', 'qx', 'qy', 'qz', 'qw']);
-export const guessed_ranges = (t: Table): Columns => guessed(t, [...RANGE_FIELDS, 'antenna', 'kind']);
-export const missing_track = (c: Columns): readonly Field[] => {
-  const globe = (['lat', 'lon', 'height'] as const).filter((f) => !c[f]),
-    local = (['x', 'y', 'z'] as const).filter((f) => !c[f]);
-  return [...(c.time ? [] : (['time'] as const)), ...(globe.length && local.length ? globe : [])];
-};
-export const missing_ranges = (c: Columns): readonly Field[] =>
-  (['time', 'anchor', 'range'] as const).filter((f) => !c[f]);
-
-export type TimeUnit = 's' | 'ms' | 'us' | 'utc';
-/// By the name of the column, else by how its first value looks.
-export function time_unit(t: Table, column: string | undefined): TimeUnit {
-  const name = plain(column ?? ''),
-    first = t.rows[0]?.[t.columns.indexOf(column ?? '')] ?? '';
-  if (/[T:]/.test(first)) return 'utc';
-  if (name.endsWith('_us')) return 'us';
-  if (name.endsWith('_ms')) return 'ms';
-  const v = Number(first);
-  return v > 1e14 ? 'us' : v > 1e11 ? 'ms' : 's';
-}
-export function range_unit(t: Table, column: string | undefined): 'm' | 'mm' {
-  if (plain(column ?? '').endsWith('_mm')) return 'mm';
-  const i = t.columns.indexOf(column ?? ''),
-    values = t.rows.slice(0, 200).map((r) => Number(r[i]));
-  return !plain(column ?? '').endsWith('_m') && values.filter((v) => v > 400).length > values.length / 2 ? 'mm' : 'm';
-}
+import { is_local, missing_ranges, missing_track, type Columns, type Field } from './fields';
+import { number_of, type Table } from './table_file';
+import {
+  address_of,
+  fix_numbers,
+  fix_of,
+  is_address,
+  PER_METRE,
+  range_unit,
+  time_reading,
+  time_us,
+  type FixNumbers,
+  type LengthUnit,
+  type TimeReading,
+} from './values';
 
 /// What no table says.
 export interface About {
@@ -191,121 +66,98 @@ export function declared_of(text: string): Declared {
   };
 }
 
+/// How the values are written.
+export interface Reading {
+  readonly track_time: TimeReading;
+  readonly range_time: TimeReading;
+  readonly range: LengthUnit;
+  readonly fix: FixNumbers | 'words' | null; ///< null: a person has to say it
+}
+export const guessed_reading = (
+  track: Table,
+  tc: Columns,
+  ranges: Table,
+  rc: Columns,
+  declared: Declared | null,
+): Reading => ({
+  track_time: time_reading(track, tc.time),
+  range_time: time_reading(ranges, rc.time),
+  range: range_unit(ranges, rc.range),
+  fix: tc.fix === undefined ? 'words' : fix_numbers(track, tc.fix, declared !== null),
+});
+
+const cell_at = (t: Table, c: Columns, f: Field): ((row: readonly string[]) => string) => {
+  const at = c[f] === undefined ? -1 : t.columns.indexOf(c[f]);
+  return (row) => row[at] ?? '';
+};
+
+export interface Overlap {
+  readonly share: number; ///< of the ranges, within the time of the track
+  readonly track_us: readonly [number, number];
+  readonly ranges_us: readonly [number, number];
+}
+/// Null where a table has no moment. Clocks that are apart leave ranges without a position.
+export function overlap_of(
+  track: Table,
+  tc: Columns,
+  ranges: Table,
+  rc: Columns,
+  reading: Reading,
+  epoch_ms: number,
+): Overlap | null {
+  const times = (t: Table, c: Columns, how: TimeReading): number[] => {
+      const cell = cell_at(t, c, 'time');
+      return t.rows.map((row) => time_us(cell(row), how, t.decimal, epoch_ms)).filter(Number.isFinite);
+    },
+    ends = (us: readonly number[]): [number, number] => [
+      us.reduce((a, b) => Math.min(a, b), Infinity),
+      us.reduce((a, b) => Math.max(a, b), -Infinity),
+    ],
+    of_track = times(track, tc, reading.track_time),
+    of_ranges = times(ranges, rc, reading.range_time);
+  if (!of_track.length || !of_ranges.length) return null;
+  const [from, to] = ends(of_track);
+  return {
+    share: of_ranges.filter((t) => t >= from && t <= to).length / of_ranges.length,
+    track_us: [from, to],
+    ranges_us: ends(of_ranges),
+  };
+}
+
 export interface Flight {
   readonly mission: Wire<'MissionCreate'>;
   readonly fixes: readonly object[];
   readonly ranges: readonly object[];
+  readonly names: ReadonlyMap<string, string>; ///< of anchors that the files call by a name, by their address
   readonly refused: readonly string[]; ///< rows that are no numbers, in words
+  readonly unknown_fix: ReadonlyMap<string, number>; ///< fix classes that say nothing, and how many positions have them
 }
-const FIX: Readonly<Record<string, string>> = {
-  '0': 'single',
-  '1': 'float',
-  '2': 'fixed',
-  fixed: 'fixed',
-  fix: 'fixed',
-  float: 'float',
-  dgps: 'dgps',
-  single: 'single',
-  none: 'none',
-};
-/// "0x6a2f" or plain decimal, as everywhere.
-const ADDRESS = /^(0x[0-9a-f]+|[0-9]+)$/i;
 
 export function flight_of(
   track: Table,
-  track_columns: Columns,
+  tc: Columns,
   ranges: Table,
-  range_columns: Columns,
-  units: { readonly track: TimeUnit; readonly ranges: TimeUnit; readonly range: 'm' | 'mm' },
+  rc: Columns,
+  reading: Reading,
   about: About,
   declared: Declared | null,
 ): Flight {
-  const refused: string[] = [],
-    missing = [...missing_track(track_columns), ...missing_ranges(range_columns)];
+  const missing = [...missing_track(tc), ...missing_ranges(rc)];
   if (missing.length) throw new Error(`no column is chosen for ${missing.join(', ')}`);
-  const local = !track_columns.lat || !track_columns.lon || !track_columns.height,
-    at = (t: Table, c: Columns, f: Field): number => (c[f] === undefined ? -1 : t.columns.indexOf(c[f])),
-    micros = (text: string, unit: TimeUnit): number => {
-      if (unit === 'utc') return Date.parse(text) * 1000;
-      const v = Number(text),
-        us = v * { s: 1e6, ms: 1e3, us: 1 }[unit];
-      // Seconds since 1970 are a date; fewer count from the beginning of the flight.
-      return Math.round(us < 1e15 ? about.epoch_ms * 1000 + us : us);
-    };
-  const fixes = track.rows.flatMap((row, i): object[] => {
-    const cell = (f: Field): string => row[at(track, track_columns, f)] ?? '',
-      value = (f: Field): number | null => (cell(f) === '' ? null : (num(Number(cell(f))) ?? NaN)),
-      t_us = micros(cell('time'), units.track),
-      place = local ? [value('x'), value('y'), value('z')] : [value('lon'), value('lat'), value('height')];
-    if (!Number.isFinite(t_us) || place.some((v) => v === null || !Number.isFinite(v))) {
-      refused.push(`${track.name} line ${i + 2}: no time or place`);
-      return [];
-    }
-    const [h, v] = [value('sigma_h'), value('sigma_v')],
-      q = (['qx', 'qy', 'qz', 'qw'] as const).map(value),
-      heading = declared?.heading
-        ? 90 - (Number(row[track.columns.indexOf(declared.heading.column)]) + declared.heading.add_deg)
-        : value('heading');
-    return [
-      {
-        t_us,
-        seq: i,
-        ...(local ? { local_m: place } : { lon: place[0], lat: place[1], h_m: place[2] }),
-        fix: FIX[cell('fix').toLowerCase()] ?? 'fixed',
-        ...(h !== null && v !== null ? { sigma_m: [h, h, v] } : {}),
-        ...(q.every((x) => x !== null)
-          ? { q }
-          : heading === null
-            ? {}
-            : { heading_deg: ((heading % 360) + 360) % 360 }),
-        ...(value('age') === null ? {} : { correction_age_s: value('age') }),
-        ...(value('satellites') === null ? {} : { satellites: value('satellites') }),
-      },
-    ];
-  });
-  const rows = ranges.rows.flatMap((row, i): object[] => {
-    const cell = (f: Field): string => row[at(ranges, range_columns, f)] ?? '',
-      value = (f: Field): number | null => (cell(f) === '' ? null : num(Number(cell(f)))),
-      t_us = micros(cell('time'), units.ranges),
-      range = value('range');
-    const tag = cell('tag') || about.tag;
-    if (!Number.isFinite(t_us) || range === null || !ADDRESS.test(cell('anchor')) || !ADDRESS.test(tag)) {
-      refused.push(
-        `${ranges.name} line ${i + 2}: ${
-          !ADDRESS.test(tag)
-            ? `tag "${tag}" is no radio address (0x6e01 or decimal)`
-            : !ADDRESS.test(cell('anchor'))
-              ? `anchor "${cell('anchor')}" is no radio address (0x6a2f or decimal)`
-              : 'no time or range'
-        }`,
-      );
-      return [];
-    }
-    const more = (['rss', 'rx', 'fp', 'seq', 'antenna'] as const).flatMap((f): [string, number][] => {
-      const v = value(f),
-        name = { rss: 'rss_dbm', rx: 'rx_dbm', fp: 'fp_dbm', seq: 'seq', antenna: 'antenna' }[f];
-      return v === null ? [] : [[name, v]];
-    });
-    return [
-      {
-        t_us,
-        tag: tag.toLowerCase(),
-        anchor: cell('anchor').toLowerCase(),
-        distance_m: units.range === 'mm' ? range / 1000 : range,
-        ...(cell('kind') ? { kind: cell('kind') } : {}),
-        ...(range_columns.seq ? {} : { seq: i }),
-        ...Object.fromEntries(more),
-      },
-    ];
-  });
-  // A pose in each range: several of one moment are one position.
-  const once = track === ranges ? [...new Map(fixes.map((f) => [(f as { t_us: number }).t_us, f])).values()] : fixes;
-  const heard = [...new Set(rows.map((r) => (r as { tag: string }).tag))];
+  if (reading.fix === null) throw new Error('what the numbers of the fix class mean is not chosen');
+  const refused: string[] = [],
+    unknown_fix = new Map<string, number>(),
+    names = new Map<string, string>(),
+    fixes = fixes_of(track, tc, reading, about, declared, refused, unknown_fix),
+    rows = ranges_of(ranges, rc, reading, about, names, refused),
+    // A pose in each range: several of one moment are one position.
+    once = track === ranges ? [...new Map(fixes.map((f) => [f.t_us, f])).values()] : fixes,
+    heard = [...new Set(rows.map((r) => r.tag))];
   return {
     mission: {
       name: about.name || 'Imported flight',
       ...(about.kit ? { kit: about.kit } : {}),
-      frame: local ? 'local' : 'wgs84',
+      frame: is_local(tc) ? 'local' : 'wgs84',
       track_point: about.point,
       take_devices: false,
       tags:
@@ -314,6 +166,127 @@ export function flight_of(
     },
     fixes: once,
     ranges: rows,
+    names,
     refused,
+    unknown_fix,
   };
+}
+
+function fixes_of(
+  t: Table,
+  c: Columns,
+  reading: Reading,
+  about: About,
+  declared: Declared | null,
+  refused: string[],
+  unknown_fix: Map<string, number>,
+): { t_us: number }[] {
+  const numbers = reading.fix ?? 'words',
+    local = is_local(c),
+    text = (f: Field) => cell_at(t, c, f),
+    value = (f: Field): ((row: readonly string[]) => number | null) => {
+      const cell = text(f);
+      return (row) => num(number_of(cell(row), t.decimal));
+    },
+    time = text('time'),
+    place = (local ? (['x', 'y', 'z'] as const) : (['lon', 'lat', 'height'] as const)).map(value),
+    fix = text('fix'),
+    [h, v, e, n] = (['sigma_h', 'sigma_v', 'sigma_e', 'sigma_n'] as const).map(value),
+    q = (['qx', 'qy', 'qz', 'qw'] as const).map(value),
+    [age, satellites] = (['age', 'satellites'] as const).map(value),
+    declared_at = declared?.heading ? t.columns.indexOf(declared.heading.column) : -1,
+    own_heading = value('heading'),
+    heading = (row: readonly string[]): number | null =>
+      declared?.heading
+        ? num(90 - (number_of(row[declared_at] ?? '', t.decimal) + declared.heading.add_deg))
+        : own_heading(row);
+  /// No column: motion capture, and rovers that write nothing but RTK fixed; the page says so before it is sent.
+  const class_of = (row: readonly string[]): string => {
+    if (c.fix === undefined) return 'fixed';
+    const known = fix_of(fix(row), numbers);
+    if (known === null) unknown_fix.set(fix(row), (unknown_fix.get(fix(row)) ?? 0) + 1);
+    return known ?? 'none';
+  };
+  return t.rows.flatMap((row, i) => {
+    const t_us = time_us(time(row), reading.track_time, t.decimal, about.epoch_ms),
+      at = place.map((p) => p(row));
+    if (!Number.isFinite(t_us) || at.some((p) => p === null)) {
+      refused.push(
+        `${t.name} row ${i + 2}: ${Number.isFinite(t_us) ? 'no place' : `"${time(row)}" is no time that is known (2026-05-04 10:00:01.5)`}`,
+      );
+      return [];
+    }
+    const up = v!(row),
+      sides = [e!(row) ?? h!(row), n!(row) ?? h!(row)],
+      turn = q.map((x) => x(row)),
+      to = heading(row);
+    return [
+      {
+        t_us,
+        seq: i,
+        ...(local ? { local_m: at } : { lon: at[0], lat: at[1], h_m: at[2] }),
+        fix: class_of(row),
+        ...(up !== null && sides.every((x) => x !== null) ? { sigma_m: [...sides, up] } : {}),
+        ...(turn.every((x) => x !== null) ? { q: turn } : to === null ? {} : { heading_deg: ((to % 360) + 360) % 360 }),
+        ...(age!(row) === null ? {} : { correction_age_s: age!(row) }),
+        ...(satellites!(row) === null ? {} : { satellites: satellites!(row) }),
+      },
+    ];
+  });
+}
+
+function ranges_of(
+  t: Table,
+  c: Columns,
+  reading: Reading,
+  about: About,
+  names: Map<string, string>,
+  refused: string[],
+): { t_us: number; tag: string }[] {
+  const text = (f: Field) => cell_at(t, c, f),
+    [time, range, anchor, tag_cell, kind] = (['time', 'range', 'anchor', 'tag', 'kind'] as const).map(text),
+    more = (['rss', 'rx', 'fp', 'seq', 'antenna'] as const).map((f) => ({
+      name: { rss: 'rss_dbm', rx: 'rx_dbm', fp: 'fp_dbm', seq: 'seq', antenna: 'antenna' }[f],
+      cell: text(f),
+    }));
+  return t.rows.flatMap((row, i) => {
+    const t_us = time_us(time!(row), reading.range_time, t.decimal, about.epoch_ms),
+      distance = number_of(range!(row), t.decimal),
+      who = anchor!(row),
+      tag = tag_cell!(row) || about.tag,
+      wrong = !tag
+        ? 'no tag'
+        : !who
+          ? 'no anchor'
+          : !Number.isFinite(t_us)
+            ? `"${time!(row)}" is no time that is known (2026-05-04 10:00:01.5)`
+            : !Number.isFinite(distance)
+              ? 'no range'
+              : '';
+    if (wrong) {
+      refused.push(`${t.name} row ${i + 2}: ${wrong}`);
+      return [];
+    }
+    const address = address_of(who);
+    if (!is_address(who)) {
+      const other = names.get(address) ?? who;
+      if (other !== who) throw new Error(`the names "${who}" and "${other}" give one address: rename one of them`);
+      names.set(address, who);
+    }
+    return [
+      {
+        t_us,
+        tag: address_of(tag),
+        anchor: address,
+        distance_m: distance / PER_METRE[reading.range],
+        ...(kind!(row) ? { kind: kind!(row) } : {}),
+        ...(c.seq ? {} : { seq: i }),
+        ...Object.fromEntries(
+          more
+            .map(({ name, cell }) => [name, num(number_of(cell(row), t.decimal))] as const)
+            .filter(([, v]) => v !== null),
+        ),
+      },
+    ];
+  });
 }

@@ -1,44 +1,17 @@
 /// Import a flight: a folder, tables or an archive is dropped; columns whose names say nothing are told by a person; the flight opens.
 import { useEffect, useRef, useState } from 'preact/hooks';
 import './start.css';
-import { error_text } from '../../api/client';
-import { send_flight } from '../../api/imports';
-import { load_missions } from '../../state/archive';
-import { chosen_mission, say } from '../../state/store';
-import { fixed, grouped } from '../../ui/format';
-import {
-  declared_of,
-  FIELD_WORDS,
-  flight_of,
-  guessed_ranges,
-  guessed_track,
-  missing_ranges,
-  missing_track,
-  RANGE_FIELDS,
-  range_unit,
-  table_of,
-  time_unit,
-  TRACK_FIELDS,
-  type About,
-  type Columns,
-  type Declared,
-  type Field,
-  type Table,
-} from './flight_files';
+import { guessed_ranges, guessed_track, missing_ranges, missing_track } from './fields';
+import { declared_of } from './flight_files';
+import { Mapping, type Found } from './mapping';
+import { decoded, table_of, type Table } from './table_file';
 import { entries_of, inflated } from './unzip';
-
-interface Found {
-  readonly track: Table;
-  readonly ranges: Table;
-  readonly declared: Declared | null;
-  readonly name: string;
-}
 
 async function texts_of(files: readonly File[]): Promise<{ name: string; read: () => Promise<string> }[]> {
   const out: { name: string; read: () => Promise<string> }[] = [];
   for (const f of files) {
     if (/\.zip$/i.test(f.name)) out.push(...entries_of(new Uint8Array(await f.arrayBuffer())));
-    else out.push({ name: f.name, read: () => f.text() });
+    else out.push({ name: f.name, read: async () => decoded(new Uint8Array(await f.arrayBuffer())) });
     if (/\.csv\.gz$/i.test(f.name)) {
       const bytes = new Uint8Array(await f.arrayBuffer());
       out[out.length - 1] = { name: f.name.replace(/\.gz$/i, ''), read: () => inflated(bytes, 'gzip') };
@@ -52,7 +25,7 @@ async function found_in(files: readonly File[]): Promise<Found> {
     base = (n: string): string => n.split('/').pop()!.toLowerCase(),
     declared_file = texts.find((t) => base(t.name) === 'flight.json'),
     tables: Table[] = [];
-  for (const t of texts.filter((x) => /\.(csv|tsv|txt)$/.test(base(x.name)) && !base(x.name).includes('truth')))
+  for (const t of texts.filter((x) => /\.(csv|tsv|txt|pos|llh)$/.test(base(x.name)) && !base(x.name).includes('truth')))
     tables.push(table_of(base(t.name), await t.read()));
   if (!tables.length)
     throw new Error('There is no table in it: a flight is flight.json, track.csv and ranges.csv, or tables alone.');
@@ -62,7 +35,7 @@ async function found_in(files: readonly File[]): Promise<Found> {
     ranges = named(/(^|[^a-z])(range|distance)/) ?? likeliest(tables, (t) => missing_ranges(guessed_ranges(t)).length)!,
     others = tables.filter((t) => t !== ranges),
     track =
-      others.find((t) => /(^|[^a-z])(track|gnss|gps|pos|rover|fix)/.test(t.name)) ??
+      others.find((t) => /(^|[^a-z])(track|gnss|gps|pos|rover|fix)|\.(pos|llh)$/.test(t.name)) ??
       likeliest(others, (t) => missing_track(guessed_track(t)).length) ??
       ranges;
   return {
@@ -115,8 +88,8 @@ export function Import() {
       <div>
         <h1>Import a flight</h1>
         <p class="lead">
-          A flight folder (flight.json, track.csv, ranges.csv), the two tables alone, or either as .zip. Nothing leaves
-          this server.
+          A flight folder (flight.json, track.csv, ranges.csv), the two tables alone as a logger wrote them, or either
+          as .zip. The track may be a .pos file of RTKLIB. Nothing leaves this server.
         </p>
         {!found && (
           <div
@@ -144,7 +117,7 @@ export function Import() {
               ref={files}
               type="file"
               multiple
-              accept=".csv,.tsv,.txt,.json,.zip,.gz"
+              accept=".csv,.tsv,.txt,.pos,.llh,.json,.zip,.gz"
               hidden
               aria-label="Flight files"
               onChange={picked}
@@ -160,231 +133,5 @@ export function Import() {
         {found && <Mapping found={found} back={() => set_found(null)} />}
       </div>
     </div>
-  );
-}
-
-/// What each column is, and what no table says; asked for where the names do not say it, open to change where they do.
-function Mapping({ found, back }: { found: Found; back: () => void }) {
-  const { track, ranges, declared } = found,
-    [tc, set_tc] = useState<Columns>(() => guessed_track(track)),
-    [rc, set_rc] = useState<Columns>(() => guessed_ranges(ranges)),
-    [about, set_about] = useState<About>(() => ({
-      name: found.name,
-      kit: '',
-      epoch_ms: Date.now(),
-      point: 'gnss_antenna',
-      lever_arm_m: [0, 0, 0],
-      tag: '',
-      ...declared?.about,
-    })),
-    [share, set_share] = useState<number | null>(null),
-    [problem, set_problem] = useState('');
-  const missing = [...missing_track(tc), ...missing_ranges(rc)],
-    needs_tag = !rc.tag && !/^(0x[0-9a-f]+|[0-9]+)$/i.test(about.tag),
-    units = {
-      track: time_unit(track, tc.time),
-      ranges: time_unit(ranges, rc.time),
-      range: range_unit(ranges, rc.range),
-    };
-  const send = async (): Promise<void> => {
-    set_problem('');
-    try {
-      const flight = flight_of(track, tc, ranges, rc, units, about, declared);
-      if (!flight.fixes.length || !flight.ranges.length)
-        throw new Error(flight.refused[0] ?? 'There is not one position and one range in it.');
-      set_share(0);
-      const sent = await send_flight(flight.mission, flight.fixes, flight.ranges, set_share);
-      await load_missions();
-      chosen_mission.value = sent.mission;
-      const not = sent.rejected + flight.refused.length;
-      say(
-        `${grouped(sent.accepted)} rows are in${not ? `, ${grouped(not)} rejected (first: ${flight.refused[0] ?? sent.first_reason})` : ''}`,
-      );
-      location.hash = '#/anchors';
-    } catch (e) {
-      set_problem(error_text(e));
-      set_share(null);
-    }
-  };
-  return (
-    <form
-      class="mapping"
-      data-testid="mapping"
-      onSubmit={(e) => {
-        e.preventDefault();
-        void send();
-      }}
-    >
-      <p role="status">
-        {track === ranges
-          ? `${ranges.name}: ${grouped(ranges.rows.length)} rows with a place each.`
-          : `${track.name}: ${grouped(track.rows.length)} positions. ${ranges.name}: ${grouped(ranges.rows.length)} ranges.`}{' '}
-        {missing.length === 0 && !needs_tag
-          ? 'All columns are known.'
-          : `Say what is ${[...missing.map((f) => FIELD_WORDS[f as keyof typeof FIELD_WORDS].toLowerCase()), ...(needs_tag ? ['the tag'] : [])].join(', ')}.`}
-      </p>
-      <details open={missing.length > 0 || needs_tag}>
-        <summary>Columns</summary>
-        <div class="cols">
-          <ColumnTable
-            title={`Track, ${track.name}`}
-            table={track}
-            fields={TRACK_FIELDS}
-            columns={tc}
-            set={set_tc}
-            missing={missing_track(tc)}
-          />
-          <ColumnTable
-            title={`Ranges, ${ranges.name}`}
-            table={ranges}
-            fields={RANGE_FIELDS}
-            columns={rc}
-            set={set_rc}
-            missing={missing_ranges(rc)}
-          />
-        </div>
-        <p class="mut">
-          Times are {{ s: 'seconds', ms: 'milliseconds', us: 'microseconds', utc: 'dates' }[units.ranges]}, ranges{' '}
-          {units.range === 'mm' ? 'millimetres' : 'metres'}: as the names and the first values say.
-        </p>
-      </details>
-      <div class="fields">
-        <label>
-          <span class="lab">Name</span>
-          <input
-            value={about.name}
-            maxLength={200}
-            data-testid="import-name"
-            onInput={(e) => set_about({ ...about, name: e.currentTarget.value })}
-          />
-        </label>
-        {!rc.tag && !declared?.tags && (
-          <label>
-            <span class="lab">Radio address of the tag</span>
-            <input
-              value={about.tag}
-              placeholder="0x6e01"
-              data-testid="import-tag"
-              onInput={(e) => set_about({ ...about, tag: e.currentTarget.value.trim() })}
-            />
-          </label>
-        )}
-        {!declared && (
-          <>
-            <label>
-              <span class="lab">The track is of</span>
-              <select
-                value={about.point}
-                onChange={(e) => set_about({ ...about, point: e.currentTarget.value as About['point'] })}
-              >
-                <option value="gnss_antenna">the GNSS antenna</option>
-                <option value="body">the aircraft's middle</option>
-                <option value="tag_antenna">the tag's antenna</option>
-              </select>
-            </label>
-            {about.point !== 'tag_antenna' && (
-              <fieldset class="arm">
-                <legend class="lab">From there to the tag: forward, left, up, m</legend>
-                {[0, 1, 2].map((i) => (
-                  <input
-                    key={i}
-                    class="cell"
-                    inputMode="decimal"
-                    aria-label={['Forward, m', 'Left, m', 'Up, m'][i]}
-                    value={about.lever_arm_m[i]}
-                    onChange={(e) => {
-                      const arm = [...about.lever_arm_m] as [number, number, number];
-                      arm[i] = Number(e.currentTarget.value.replace(',', '.')) || 0;
-                      set_about({ ...about, lever_arm_m: arm });
-                    }}
-                  />
-                ))}
-              </fieldset>
-            )}
-          </>
-        )}
-      </div>
-      {problem && (
-        <div class="problem" role="alert" data-testid="import-problem">
-          <b>That did not work.</b> {problem}
-        </div>
-      )}
-      {share !== null && <progress value={share} max={1} aria-label={`Sent ${fixed(share * 100, 0)} %`} />}
-      <div class="actions">
-        <button type="button" class="btn" disabled={share !== null} onClick={back}>
-          Other files
-        </button>
-        <button
-          class="btn primary"
-          data-testid="import-send"
-          disabled={missing.length > 0 || needs_tag || share !== null}
-        >
-          {share === null ? 'Import' : `Importing, ${fixed(share * 100, 0)} %`}
-        </button>
-      </div>
-    </form>
-  );
-}
-
-function ColumnTable({
-  title,
-  table,
-  fields,
-  columns,
-  set,
-  missing,
-}: {
-  title: string;
-  table: Table;
-  fields: readonly (keyof typeof FIELD_WORDS)[];
-  columns: Columns;
-  set: (c: Columns) => void;
-  missing: readonly Field[];
-}) {
-  const samples = (column: string): string =>
-    table.rows
-      .slice(0, 3)
-      .map((r) => r[table.columns.indexOf(column)])
-      .join(', ');
-  return (
-    <table class="tbl">
-      <caption>{title}</caption>
-      <thead>
-        <tr>
-          <th scope="col">What</th>
-          <th scope="col">Column</th>
-          <th scope="col">First values</th>
-        </tr>
-      </thead>
-      <tbody>
-        {fields.map((f) => (
-          <tr key={f}>
-            <th scope="row" class={missing.includes(f) ? 'bad' : ''}>
-              {FIELD_WORDS[f]}
-              {missing.includes(f) && <span class="sr"> is needed</span>}
-            </th>
-            <td>
-              <select
-                aria-label={`Column of ${FIELD_WORDS[f]}`}
-                data-testid={`column-of-${f}`}
-                value={columns[f] ?? ''}
-                onChange={(e) => {
-                  const { [f]: _, ...rest } = columns;
-                  set(e.currentTarget.value ? { ...rest, [f]: e.currentTarget.value } : rest);
-                }}
-              >
-                <option value="">none</option>
-                {table.columns.map((c) => (
-                  <option key={c} value={c}>
-                    {c}
-                  </option>
-                ))}
-              </select>
-            </td>
-            <td class="mut n">{columns[f] ? samples(columns[f]) : ''}</td>
-          </tr>
-        ))}
-      </tbody>
-    </table>
   );
 }

@@ -1,4 +1,6 @@
 /// Files of a zip archive: its central directory, stored and deflated entries; no encryption, no zip64. APPNOTE.TXT 6.3.10, 4.3. No DOM.
+import { decoded } from './table_file';
+
 const END = 0x06054b50,
   ENTRY = 0x02014b50;
 const MAX_BYTES = 512 * 1024 * 1024; ///< unpacked: a flight of hours; an archive that unpacks to more is none
@@ -18,7 +20,7 @@ export async function inflated(bytes: Uint8Array, format: 'deflate-raw' | 'gzip'
     if (size > MAX_BYTES) throw new Error(`unpacks to more than ${MAX_BYTES / 1024 / 1024} MiB`);
     parts.push(value);
   }
-  return new Blob(parts as BlobPart[]).text();
+  return decoded(new Uint8Array(await new Blob(parts as BlobPart[]).arrayBuffer()));
 }
 export function entries_of(bytes: Uint8Array): Packed[] {
   const view = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength),
@@ -47,7 +49,7 @@ export function entries_of(bytes: Uint8Array): Packed[] {
         if (local + 30 > bytes.length) throw new Error('the zip archive is damaged');
         const from = local + 30 + view.getUint16(local + 26, true) + view.getUint16(local + 28, true),
           packed = bytes.subarray(from, from + size);
-        if (method === 0) return text.decode(packed);
+        if (method === 0) return decoded(packed);
         if (method !== 8) throw new Error(`${name} is packed by method ${method}; stored and deflate are read`);
         return inflated(packed, 'deflate-raw');
       },

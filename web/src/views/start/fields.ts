@@ -1,0 +1,94 @@
+/// What a column of a flight's tables can be, and the names under which loggers write it. No DOM.
+import type { Table } from './table_file';
+
+/// Without those that `missing_*` names there is no flight.
+export const TRACK_FIELDS = ['time', 'lat', 'lon', 'height', 'x', 'y', 'z', 'fix', 'sigma_h', 'sigma_v'] as const;
+export const RANGE_FIELDS = ['time', 'anchor', 'range', 'tag', 'rss', 'rx', 'fp', 'seq'] as const;
+export type TrackField =
+  (typeof TRACK_FIELDS)[number] | 'sigma_e' | 'sigma_n' | 'age' | 'satellites' | 'heading' | 'qx' | 'qy' | 'qz' | 'qw';
+export type RangeField = (typeof RANGE_FIELDS)[number] | 'antenna' | 'kind';
+export type Field = TrackField | RangeField;
+export type Columns = Readonly<Partial<Record<Field, string>>>;
+export const FIELD_WORDS: Record<(typeof TRACK_FIELDS)[number] | (typeof RANGE_FIELDS)[number], string> = {
+  time: 'Time',
+  lat: 'Latitude, °',
+  lon: 'Longitude, °',
+  height: 'Height above ellipsoid, m',
+  x: 'x, m',
+  y: 'y, m',
+  z: 'z, m',
+  fix: 'Fix class',
+  sigma_h: 'σ horizontal, m',
+  sigma_v: 'σ vertical, m',
+  anchor: 'Anchor',
+  range: 'Range',
+  tag: 'Tag',
+  rss: 'RSS, dBm',
+  rx: 'Receive power, dBm',
+  fp: 'First path power, dBm',
+  seq: 'Number of the row',
+};
+const TIMES =
+  't_s t_us t_ms t_ns time time_s time_ms time_us time_ns time_utc timestamp timestamp_s timestamp_ms timestamp_us timestamp_ns t utc ' +
+  'gpst gps_time unix datetime date_time zeit';
+const NAMES: Readonly<Record<Field, string>> = {
+  time: TIMES,
+  lat: 'lat_deg lat latitude latitude_deg breite',
+  lon: 'lon_deg lon lng longitude longitude_deg laenge',
+  height:
+    'alt_m h_m height_m alt altitude height h ellipsoidal_height height_ellipsoid height_ellipsoid_m altitude_m hoehe',
+  x: 'x_m x e_m east east_m',
+  y: 'y_m y n_m north north_m',
+  z: 'z_m z u_m up up_m',
+  fix: 'fix fix_type quality fix_quality gps_qual rtk q carrsoln',
+  sigma_h: 'sd_h_m sigma_h_m hacc h_acc sd_h',
+  sigma_v: 'sd_v_m sigma_v_m vacc v_acc sd_v sdu_m sigma_u_m',
+  sigma_e: 'sde_m sigma_e_m',
+  sigma_n: 'sdn_m sigma_n_m',
+  age: 'correction_age_s age_s age',
+  satellites: 'satellites sats num_sv ns',
+  heading: 'heading_deg heading yaw_deg yaw',
+  qx: 'qx',
+  qy: 'qy',
+  qz: 'qz',
+  qw: 'qw',
+  anchor: 'anchor_id anchor anchor_address anchor_name remote remote_id dest destination anker',
+  range: 'range_m distance_m range distance dist range_mm distance_mm dist_m dist_mm range_cm distance_cm abstand',
+  tag: 'tag_id tag tag_address source local_id',
+  rss: 'rss_dbm rss rssi',
+  rx: 'rx_dbm rx_power rx',
+  fp: 'fp_dbm fp_power first_path_dbm',
+  seq: 'seq sequence',
+  antenna: 'antenna',
+  kind: 'kind',
+};
+export const plain = (s: string): string =>
+  s
+    .toLowerCase()
+    .replaceAll('ä', 'ae')
+    .replaceAll('ö', 'oe')
+    .replaceAll('ü', 'ue')
+    .replaceAll(/[^a-z0-9]+/g, '_')
+    .replace(/^_|_$/g, '');
+
+/// The columns by their names, the usual name of a field first.
+function guessed(t: Table, fields: readonly Field[]): Columns {
+  const by_name = new Map(t.columns.map((c) => [plain(c), c])),
+    out: Partial<Record<Field, string>> = {};
+  for (const f of fields) {
+    const name = NAMES[f].split(' ').find((n) => by_name.has(n));
+    if (name) out[f] = by_name.get(name)!;
+  }
+  return out;
+}
+export const guessed_track = (t: Table): Columns =>
+  guessed(t, [...TRACK_FIELDS, 'sigma_e', 'sigma_n', 'age', 'satellites', 'heading', 'qx', 'qy', 'qz', 'qw']);
+export const guessed_ranges = (t: Table): Columns => guessed(t, [...RANGE_FIELDS, 'antenna', 'kind']);
+export const missing_track = (c: Columns): readonly Field[] => {
+  const globe = (['lat', 'lon', 'height'] as const).filter((f) => !c[f]),
+    local = (['x', 'y', 'z'] as const).filter((f) => !c[f]);
+  return [...(c.time ? [] : (['time'] as const)), ...(globe.length && local.length ? globe : [])];
+};
+export const missing_ranges = (c: Columns): readonly Field[] =>
+  (['time', 'anchor', 'range'] as const).filter((f) => !c[f]);
+export const is_local = (c: Columns): boolean => !c.lat || !c.lon || !c.height;

@@ -1,0 +1,408 @@
+/// What the columns of an imported flight are, how their values are written, and what no table says; asked for where the names do not say it, open to
+/// change where they do.
+import { useMemo, useState } from 'preact/hooks';
+import { error_text } from '../../api/client';
+import { send_flight } from '../../api/imports';
+import { load_missions } from '../../state/archive';
+import { chosen_mission, say } from '../../state/store';
+import { fixed, grouped } from '../../ui/format';
+import {
+  FIELD_WORDS,
+  guessed_ranges,
+  guessed_track,
+  is_local,
+  missing_ranges,
+  missing_track,
+  RANGE_FIELDS,
+  TRACK_FIELDS,
+  type Columns,
+  type Field,
+} from './fields';
+import {
+  flight_of,
+  guessed_reading,
+  overlap_of,
+  type About,
+  type Declared,
+  type Overlap,
+  type Reading,
+} from './flight_files';
+import { anchor_columns, sample_of, with_a_row_for_each_range, type Table } from './table_file';
+import { FIX_NUMBERS, LENGTH_UNITS, TIME_UNITS, type TimeReading } from './values';
+
+export interface Found {
+  readonly track: Table;
+  readonly ranges: Table;
+  readonly declared: Declared | null;
+  readonly name: string;
+}
+const field_words = (f: Field): string => FIELD_WORDS[f as keyof typeof FIELD_WORDS].toLowerCase();
+const MOST_ANCHORS = 64; ///< columns; a table of more numbers is none of one column for each anchor
+
+export function Mapping({ found, back }: { found: Found; back: () => void }) {
+  const { track, declared } = found,
+    [ranges, set_ranges] = useState<Table>(found.ranges),
+    [tc, set_tc] = useState<Columns>(() => guessed_track(track)),
+    [rc, set_rc] = useState<Columns>(() => guessed_ranges(ranges)),
+    [said, set_said] = useState<Partial<Reading>>({}),
+    [about, set_about] = useState<About>(() => ({
+      name: found.name,
+      kit: '',
+      epoch_ms: Date.now(),
+      point: 'gnss_antenna',
+      lever_arm_m: [0, 0, 0],
+      tag: '',
+      ...declared?.about,
+    })),
+    [share, set_share] = useState<number | null>(null),
+    [problem, set_problem] = useState('');
+  // A few seconds of work for a flight of hours: only where what it rests on changes.
+  const reading = useMemo<Reading>(
+      () => ({ ...guessed_reading(track, tc, ranges, rc, declared), ...said }),
+      [track, tc, ranges, rc, declared, said],
+    ),
+    needed = [
+      ...missing_track(tc).map((f) => (f === 'time' ? 'the time of the track' : field_words(f))),
+      ...missing_ranges(rc).map((f) => (f === 'time' ? 'the time of the ranges' : field_words(f))),
+    ],
+    complete = needed.length === 0,
+    missing = [
+      ...needed,
+      ...(!rc.tag && !about.tag ? ['the tag'] : []),
+      ...(reading.fix === null ? ['what the numbers of the fix class mean'] : []),
+    ],
+    overlap = useMemo(
+      () => (complete ? overlap_of(track, tc, ranges, rc, reading, about.epoch_ms) : null),
+      [complete, track, tc, ranges, rc, reading, about.epoch_ms],
+    ),
+    wide =
+      !rc.anchor && !rc.range ? anchor_columns(ranges, Object.values({ ...rc, ...(track === ranges ? tc : {}) })) : [];
+  const send = async (): Promise<void> => {
+    set_problem('');
+    try {
+      const flight = flight_of(track, tc, ranges, rc, reading, about, declared);
+      if (!flight.fixes.length || !flight.ranges.length)
+        throw new Error(flight.refused[0] ?? 'There is not one position and one range in it.');
+      set_share(0);
+      const sent = await send_flight(flight.mission, flight.fixes, flight.ranges, flight.names, set_share);
+      await load_missions();
+      chosen_mission.value = sent.mission;
+      const not = sent.rejected + flight.refused.length,
+        [odd] = flight.unknown_fix;
+      say(
+        [
+          `${grouped(sent.accepted)} rows are in`,
+          not ? `${grouped(not)} rejected (first: ${flight.refused[0] ?? sent.first_reason})` : '',
+          odd
+            ? `${grouped(odd[1])} positions have the fix class "${odd[0]}", which is not known: they count as no fix`
+            : '',
+          sent.unnamed ? `${sent.unnamed} names of anchors could not be kept` : '',
+        ]
+          .filter(Boolean)
+          .join('; '),
+      );
+      location.hash = '#/anchors';
+    } catch (e) {
+      set_problem(error_text(e));
+      set_share(null);
+    }
+  };
+  return (
+    <form
+      class="mapping"
+      data-testid="mapping"
+      onSubmit={(e) => {
+        e.preventDefault();
+        void send();
+      }}
+    >
+      <p role="status">
+        {track === ranges
+          ? `${ranges.name}: ${grouped(ranges.rows.length)} rows with a place each.`
+          : `${track.name}: ${grouped(track.rows.length)} positions. ${ranges.name}: ${grouped(ranges.rows.length)} ranges.`}{' '}
+        {missing.length === 0 ? 'All columns are known.' : `Say what is ${missing.join(', ')}.`}
+      </p>
+      {wide.length > 1 && wide.length <= MOST_ANCHORS && (
+        <p>
+          No column is the range. Is each of {wide.slice(0, 4).join(', ')}
+          {wide.length > 4 ? ` and ${wide.length - 4} more` : ''} an anchor?{' '}
+          <button
+            type="button"
+            class="btn"
+            data-testid="import-wide"
+            onClick={() => {
+              const long = with_a_row_for_each_range(ranges, wide);
+              set_ranges(long);
+              set_rc(guessed_ranges(long));
+            }}
+          >
+            One column for each anchor
+          </button>
+        </p>
+      )}
+      <details open={missing.length > 0}>
+        <summary>Columns</summary>
+        <div class="cols">
+          <ColumnTable
+            title={`Track, ${track.name}`}
+            table={track}
+            fields={TRACK_FIELDS}
+            columns={tc}
+            set={set_tc}
+            missing={missing_track(tc)}
+          />
+          <ColumnTable
+            title={`Ranges, ${ranges.name}`}
+            table={ranges}
+            fields={RANGE_FIELDS}
+            columns={rc}
+            set={set_rc}
+            missing={missing_ranges(rc)}
+          />
+        </div>
+      </details>
+      <div class="fields">
+        <TimeFields
+          label="Times of the track"
+          of="track-time"
+          value={reading.track_time}
+          set={(track_time) => set_said({ ...said, track_time })}
+        />
+        <TimeFields
+          label="Times of the ranges"
+          of="range-time"
+          value={reading.range_time}
+          set={(range_time) => set_said({ ...said, range_time })}
+        />
+        <Choice
+          label="Ranges are in"
+          id="range-unit"
+          value={reading.range}
+          words={LENGTH_UNITS}
+          set={(range) => set_said({ ...said, range })}
+        />
+        {tc.fix !== undefined && reading.fix !== 'words' && (
+          <Choice
+            label="Numbers of the fix class"
+            id="fix-numbers"
+            value={reading.fix}
+            words={FIX_NUMBERS}
+            set={(fix) => set_said({ ...said, fix })}
+          />
+        )}
+      </div>
+      {tc.fix === undefined && !is_local(tc) && (
+        <p class="caution" data-testid="import-all-fixed">
+          No column says the fix class: every position counts as RTK fixed. If some were float or single, anchors are
+          wrong and nothing shows it.
+        </p>
+      )}
+      {overlap && overlap.share < 0.5 && (
+        <p class="caution" data-testid="import-apart">
+          {apart_words(overlap)}
+        </p>
+      )}
+      <div class="fields">
+        <label>
+          <span class="lab">Name</span>
+          <input
+            value={about.name}
+            maxLength={200}
+            data-testid="import-name"
+            onInput={(e) => set_about({ ...about, name: e.currentTarget.value })}
+          />
+        </label>
+        {!rc.tag && !declared?.tags && (
+          <label>
+            <span class="lab">Radio address of the tag</span>
+            <input
+              value={about.tag}
+              placeholder="0x6e01"
+              data-testid="import-tag"
+              onInput={(e) => set_about({ ...about, tag: e.currentTarget.value.trim() })}
+            />
+          </label>
+        )}
+        {!declared && (
+          <>
+            <label>
+              <span class="lab">The track is of</span>
+              <select
+                value={about.point}
+                onChange={(e) => set_about({ ...about, point: e.currentTarget.value as About['point'] })}
+              >
+                <option value="gnss_antenna">the GNSS antenna</option>
+                <option value="body">the aircraft's middle</option>
+                <option value="tag_antenna">the tag's antenna</option>
+              </select>
+            </label>
+            {about.point !== 'tag_antenna' && (
+              <fieldset class="arm">
+                <legend class="lab">From there to the tag: forward, left, up, m</legend>
+                {[0, 1, 2].map((i) => (
+                  <input
+                    key={i}
+                    class="cell"
+                    inputMode="decimal"
+                    aria-label={['Forward, m', 'Left, m', 'Up, m'][i]}
+                    value={about.lever_arm_m[i]}
+                    onChange={(e) => {
+                      const arm = [...about.lever_arm_m] as [number, number, number];
+                      arm[i] = Number(e.currentTarget.value.replace(',', '.')) || 0;
+                      set_about({ ...about, lever_arm_m: arm });
+                    }}
+                  />
+                ))}
+              </fieldset>
+            )}
+          </>
+        )}
+      </div>
+      {problem && (
+        <div class="problem" role="alert" data-testid="import-problem">
+          <b>That did not work.</b> {problem}
+        </div>
+      )}
+      {share !== null && <progress value={share} max={1} aria-label={`Sent ${fixed(share * 100, 0)} %`} />}
+      <div class="actions">
+        <button type="button" class="btn" disabled={share !== null} onClick={back}>
+          Other files
+        </button>
+        <button class="btn primary" data-testid="import-send" disabled={missing.length > 0 || share !== null}>
+          {share === null ? 'Import' : `Importing, ${fixed(share * 100, 0)} %`}
+        </button>
+      </div>
+    </form>
+  );
+}
+
+/// Why ranges would stand without a position, with both spans: what is apart by hours or by 18 s is a zone or GPS time.
+function apart_words({ share, track_us, ranges_us }: Overlap): string {
+  const clock = (us: number): string => new Date(us / 1000).toISOString().replace('T', ' ').slice(0, 19),
+    span = ([from, to]: readonly [number, number]): string => `${clock(from)} to ${clock(to)}`,
+    apart_s = (ranges_us[0] - track_us[0]) / 1e6;
+  return (
+    `${fixed(share * 100, 0)} % of the ranges lie within the time of the track. Track: ${span(track_us)} UTC. ` +
+    `Ranges: ${span(ranges_us)} UTC, ${grouped(Math.round(Math.abs(apart_s)))} s ${apart_s < 0 ? 'earlier' : 'later'}. ` +
+    (Math.abs(Math.abs(apart_s) - 18) < 3
+      ? 'That looks like GPS time in one of them.'
+      : 'Ranges outside it get no position: check units and clocks.')
+  );
+}
+
+function Choice<T extends string>({
+  label,
+  id,
+  value,
+  words,
+  set,
+}: {
+  label: string;
+  id: string;
+  value: T | null;
+  words: Readonly<Record<T, string>>;
+  set: (value: T) => void;
+}) {
+  return (
+    <label>
+      <span class="lab">{label}</span>
+      <select value={value ?? ''} data-testid={id} onChange={(e) => set(e.currentTarget.value as T)}>
+        {value === null && <option value="">to be chosen</option>}
+        {(Object.keys(words) as T[]).map((w) => (
+          <option key={w} value={w}>
+            {words[w]}
+          </option>
+        ))}
+      </select>
+    </label>
+  );
+}
+function TimeFields({
+  label,
+  of,
+  value,
+  set,
+}: {
+  label: string;
+  of: string;
+  value: TimeReading;
+  set: (value: TimeReading) => void;
+}) {
+  return (
+    <>
+      <Choice
+        label={label}
+        id={`${of}-unit`}
+        value={value.unit}
+        words={TIME_UNITS}
+        set={(unit) => set({ ...value, unit })}
+      />
+      <Choice
+        label={`${label}, clock`}
+        id={`${of}-scale`}
+        value={value.scale}
+        words={{ utc: 'UTC', gps: 'GPS time' }}
+        set={(scale) => set({ ...value, scale })}
+      />
+    </>
+  );
+}
+
+function ColumnTable({
+  title,
+  table,
+  fields,
+  columns,
+  set,
+  missing,
+}: {
+  title: string;
+  table: Table;
+  fields: readonly (keyof typeof FIELD_WORDS)[];
+  columns: Columns;
+  set: (c: Columns) => void;
+  missing: readonly Field[];
+}) {
+  const samples = (column: string): string => sample_of(table, column).slice(0, 3).join(', ');
+  return (
+    <table class="tbl">
+      <caption>{title}</caption>
+      <thead>
+        <tr>
+          <th scope="col">What</th>
+          <th scope="col">Column</th>
+          <th scope="col">First values</th>
+        </tr>
+      </thead>
+      <tbody>
+        {fields.map((f) => (
+          <tr key={f}>
+            <th scope="row" class={missing.includes(f) ? 'bad' : ''}>
+              {FIELD_WORDS[f]}
+              {missing.includes(f) && <span class="sr"> is needed</span>}
+            </th>
+            <td>
+              <select
+                aria-label={`Column of ${FIELD_WORDS[f]}`}
+                data-testid={`column-of-${f}`}
+                value={columns[f] ?? ''}
+                onChange={(e) => {
+                  const { [f]: _, ...rest } = columns;
+                  set(e.currentTarget.value ? { ...rest, [f]: e.currentTarget.value } : rest);
+                }}
+              >
+                <option value="">none</option>
+                {table.columns.map((c) => (
+                  <option key={c} value={c}>
+                    {c}
+                  </option>
+                ))}
+              </select>
+            </td>
+            <td class="mut n">{columns[f] ? samples(columns[f]) : ''}</td>
+          </tr>
+        ))}
+      </tbody>
+    </table>
+  );
+}

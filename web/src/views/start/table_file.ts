@@ -1,0 +1,113 @@
+/// A table as others write it: encodings, separators, quotes, decimal commas, and the position files of RTKLIB. No DOM.
+import Papa from 'papaparse';
+
+export interface Table {
+  readonly name: string;
+  readonly columns: readonly string[];
+  readonly rows: readonly (readonly string[])[];
+  readonly decimal: '.' | ',';
+}
+const MAX_ROWS = 2_000_000;
+const SAMPLE = 200; ///< rows that tell how a column is written
+
+/// Text of a file: by its byte order mark, else UTF-8, else the Western European of Windows, which old programs write.
+export function decoded(bytes: Uint8Array): string {
+  const [a, b] = bytes;
+  if (a === 0xff && b === 0xfe) return new TextDecoder('utf-16le').decode(bytes);
+  if (a === 0xfe && b === 0xff) return new TextDecoder('utf-16be').decode(bytes);
+  try {
+    return new TextDecoder('utf-8', { fatal: true }).decode(bytes);
+  } catch {
+    return new TextDecoder('windows-1252').decode(bytes);
+  }
+}
+
+/// Positions of RTKLIB: the last line of the heading has the names, blanks stand between columns, a moment is a date and a time of day.
+function of_rtklib(text: string): { columns: string[]; cells: string[][] } | null {
+  const lines = text.split(/\r?\n/).filter((l) => l.trim() !== ''),
+    heading = lines.filter((l) => l.startsWith('%')),
+    names = heading[heading.length - 1]?.slice(1).trim().split(/\s+/) ?? [];
+  if (!/^(GPST|UTC|JST)$/.test(names[0] ?? '')) return null;
+  const cells = lines
+    .filter((l) => !l.startsWith('%'))
+    .map((l) => {
+      const [day, clock, ...rest] = l.trim().split(/\s+/);
+      return [`${day} ${clock}`, ...rest];
+    });
+  return { columns: names, cells };
+}
+
+/// Numbers with a decimal comma are told from two numbers by the separator: a comma that separates columns is none.
+function decimal_of(separator: string, rows: readonly (readonly string[])[]): '.' | ',' {
+  if (separator === ',') return '.';
+  const cells = rows.slice(0, SAMPLE).flat(),
+    commas = cells.filter((c) => /^[+-]?\d+,\d+$/.test(c)).length,
+    points = cells.filter((c) => /^[+-]?\d+\.\d+$/.test(c)).length;
+  return commas > points ? ',' : '.';
+}
+
+/// Error: what is wrong, and in which row, counted as a spreadsheet does: the header is row 1.
+export function table_of(name: string, text: string): Table {
+  const rtklib = text.startsWith('%') ? of_rtklib(text) : null,
+    read = rtklib
+      ? null
+      : Papa.parse<string[]>(text, {
+          comments: '#',
+          skipEmptyLines: 'greedy',
+          delimitersToGuess: [',', ';', '\t', '|'],
+        }),
+    all = (rtklib ? [rtklib.columns, ...rtklib.cells] : read!.data).map((row) => row.map((cell) => cell.trim())),
+    [columns = [], ...rows] = all;
+  if (all.length < 2) throw new Error(`${name}: a header line and at least one row are needed`);
+  if (rows.length > MAX_ROWS) throw new Error(`${name}: ${rows.length} rows, at most ${MAX_ROWS}`);
+  const quotes = read?.errors.find((e) => e.type === 'Quotes');
+  if (quotes) throw new Error(`${name} row ${(quotes.row ?? 0) + 1}: a quote is opened and not closed`);
+  const decimal = decimal_of(rtklib ? ' ' : read!.meta.delimiter, rows);
+  if (columns.every((c) => c !== '' && Number.isFinite(number_of(c, decimal))))
+    throw new Error(`${name}: the first line is numbers, a header line of names is needed`);
+  const twice = columns.find((c, i) => c !== '' && columns.indexOf(c) !== i);
+  if (twice !== undefined) throw new Error(`${name}: two columns have the name "${twice}"`);
+  rows.forEach((row, i) => {
+    // Spreadsheets leave empty cells at the end of a row.
+    while (row.length > columns.length && row[row.length - 1] === '') row.pop();
+    if (row.length !== columns.length)
+      throw new Error(`${name} row ${i + 2}: ${row.length} cells, the header has ${columns.length}`);
+  });
+  return { name, columns, rows, decimal };
+}
+
+/// NaN where it is none; also for nothing at all.
+export function number_of(cell: string, decimal: '.' | ','): number {
+  if (cell === '') return NaN;
+  return Number(decimal === ',' ? cell.replace(',', '.') : cell);
+}
+/// A column's first values, as they tell what it is.
+export const sample_of = (t: Table, column: string | undefined): readonly string[] =>
+  column === undefined ? [] : t.rows.slice(0, SAMPLE).map((r) => r[t.columns.indexOf(column)] ?? '');
+/// All values of a column that occur, few or many.
+export function values_of(t: Table, column: string): ReadonlySet<string> {
+  const at = t.columns.indexOf(column),
+    out = new Set<string>();
+  for (const row of t.rows) out.add(row[at] ?? '');
+  return out;
+}
+
+/// Columns of numbers that nothing else claims: where a logger writes one column for each anchor.
+export function anchor_columns(t: Table, claimed: readonly string[]): readonly string[] {
+  return t.columns.filter((c) => {
+    const cells = c === '' || claimed.includes(c) ? [] : sample_of(t, c).filter((x) => x !== '');
+    return cells.length > 0 && cells.every((x) => Number.isFinite(number_of(x, t.decimal)));
+  });
+}
+/// The same ranges with a row for each: `anchor` and `range` beside what the row has of everything else.
+export function with_a_row_for_each_range(t: Table, anchors: readonly string[]): Table {
+  const kept = t.columns.map((c, i) => ({ c, i })).filter(({ c }) => !anchors.includes(c)),
+    at = anchors.map((c) => ({ c, i: t.columns.indexOf(c) }));
+  return {
+    ...t,
+    columns: [...kept.map(({ c }) => c), 'anchor', 'range'],
+    rows: t.rows.flatMap((row) =>
+      at.filter(({ i }) => row[i] !== '').map(({ c, i }) => [...kept.map((k) => row[k.i] ?? ''), c, row[i] ?? '']),
+    ),
+  };
+}
