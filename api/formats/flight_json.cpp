@@ -138,7 +138,16 @@ NetworkId network_id_of(std::string_view text) {
 
 Result<FlightDeclaration> read_flight_json(const std::filesystem::path& file) {
   std::ifstream in(file, std::ios::binary);
-  if (!in) return make_error(Errc::not_found, file.string() + ": cannot be opened");
+  if (!in) {
+    std::error_code ignored;
+    return make_error(
+        Errc::not_found,
+        file.string() +
+            (std::filesystem::exists(file, ignored)
+                 ? ": cannot be opened"
+                 : ": not there. A flight folder has flight.json, ranges.csv and track.csv "
+                   "(docs/formats.md); tables of other programs: Import a flight in the dashboard"));
+  }
   constexpr std::size_t k_max_bytes = 1 << 20;
   std::string text(k_max_bytes + 1, '\0');
   in.read(text.data(), static_cast<std::streamsize>(text.size()));
