@@ -9,7 +9,17 @@ import { MapBox } from '../map/map_box';
 import { done_count, shown_estimates } from '../state/done';
 import { backdrops } from '../state/floors';
 import { me, may_publish } from '../state/session';
-import { chosen_anchor, current_mission, current_scene, link, revision, synced, tick, when_back } from '../state/store';
+import {
+  chosen_anchor,
+  current_mission,
+  current_scene,
+  link,
+  revision,
+  synced,
+  tick,
+  watched_lost,
+  when_back,
+} from '../state/store';
 import type { MissionMsg } from '../live/messages';
 import { Empty, not_loaded_words } from '../ui/empty';
 import { Icon } from '../ui/marks';
@@ -232,7 +242,7 @@ export function Anchors({ anchor }: { anchor: string | null }) {
           anchors: on_map,
           selected: selected?.anchor ?? null,
           scene: live ? current_scene() : null,
-          link_lost: link.peek() === 'lost',
+          link_lost: watched_lost(),
           running: mission?.state === 'recording',
           flight: live ? building() : null,
           backdrops: backdrops(live ? mission?.origin : origin_of(rows)),

@@ -15,6 +15,7 @@ import {
   replayed,
   synced,
   tick,
+  watched_lost,
   when_back,
   link,
 } from '../../state/store';
@@ -207,7 +208,7 @@ export function Replay({ id }: { id: string | null }) {
             anchors: shown_estimates(scene),
             selected,
             scene: player?.scene ?? null,
-            link_lost: false,
+            link_lost: watched_lost(),
             running: true,
           })}
           onSelect={(a) => (chosen_anchor.value = a)}
