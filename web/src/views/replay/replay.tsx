@@ -20,11 +20,13 @@ import {
   link,
 } from '../../state/store';
 import { clock, fixed, told_apart } from '../../ui/format';
-import { Chip, Mark } from '../../ui/marks';
+import { AlarmRow } from '../../ui/alarm_row';
+import { Chip } from '../../ui/marks';
 import { AnchorCard } from '../anchor_card';
 import '../flight/flight.css';
 import { sentence, Stage } from '../flight/procedure';
 import { STATUS_LOOK } from '../flight/words';
+import { EventRow } from '../events';
 import { RangeList } from '../range_list';
 import { not_loaded_words } from '../../ui/empty';
 import { useStable } from '../../ui/use_stable';
@@ -292,16 +294,9 @@ function Then({ player }: { player: Player }) {
       {alarms.length > 0 && (
         <section class="sec-p" data-testid="replay-alarms">
           <h2>Alarms at this moment</h2>
-          <ul class="plain">
+          <ul class="alarmrows">
             {alarms.map((a) => (
-              <li key={a.id}>
-                <Mark
-                  shape={a.level === 'critical' ? 'bad' : 'caution'}
-                  tone={a.level === 'critical' ? 'bad' : 'caution'}
-                />{' '}
-                <b>{a.id}</b> {a.text && sentence(a.text)}{' '}
-                <span class="mut">for {clock((player.t_us - a.since_us) / 1e6, true)}</span>
-              </li>
+              <AlarmRow key={a.id} a={a} stood={clock((player.t_us / 1000 - a.since_ms) / 1000, true)} />
             ))}
           </ul>
         </section>
@@ -357,15 +352,11 @@ function Marks({ player, go }: { player: Player; go: (t_us: number) => void }) {
         {marks.slice(Math.max(0, here - 3), here + 6).map((m, k) => {
           const i = Math.max(0, here - 3) + k;
           return (
-            <li key={i} aria-current={i === here ? 'step' : undefined}>
+            <EventRow key={i} e={m} here={i === here}>
               <button class="btn small" onClick={() => go(m.t_us)}>
                 {clock((m.t_us - from_us) / 1e6)}
               </button>
-              <span class={i === here ? 'now' : ''}>
-                <span class="sr">{m.level}: </span>
-                {m.text}
-              </span>
-            </li>
+            </EventRow>
           );
         })}
       </ul>
