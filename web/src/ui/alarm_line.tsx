@@ -47,12 +47,12 @@ function Actions({ a }: { a: Alarm }) {
 
 /// All of them. While it is open every row keeps its place: a new one comes last, and what is over stays, said to be over.
 function AlarmList({ list, close }: { list: readonly Alarm[]; close: () => void }) {
-  const box = useDialog<HTMLDivElement>(true, close),
+  const box = useDialog<HTMLDivElement>(close),
     rows = useRef(new Map<string, Alarm>()).current,
     standing = new Set(list.map((a) => a.id));
   for (const a of list) rows.set(a.id, a);
   return (
-    <div class="alarmlist" id="alarm-list" role="dialog" aria-label="All alarms" tabIndex={-1} ref={box}>
+    <div class="alarmlist" id="alarm-list" {...box} aria-label="All alarms">
       <ul class="alarmrows">
         {[...rows.values()].map((a) => {
           const over = !standing.has(a.id);

@@ -35,9 +35,9 @@ function ScreenHelp({ close }: { close: () => void }) {
 }
 
 export function HelpSheet() {
-  const box = useDialog<HTMLElement>(true, () => (help_open.value = false));
+  const box = useDialog<HTMLElement>(() => (help_open.value = false));
   return (
-    <section class="sheet" role="dialog" aria-labelledby="help-title" tabIndex={-1} ref={box} data-testid="help">
+    <section class="sheet" {...box} aria-labelledby="help-title" data-testid="help">
       <div class="hd">
         <h2 id="help-title">Help</h2>
         <button class="btn quiet small" aria-label="Close" onClick={() => (help_open.value = false)}>

@@ -276,9 +276,9 @@ function Card({ label, word, children }: { label: string; word: string; children
   const close = (): void => {
       open_card.value = null;
     },
-    box = useDialog<HTMLDivElement>(true, close);
+    box = useDialog<HTMLDivElement>(close);
   return (
-    <div class="card" role="dialog" aria-label={label} tabIndex={-1} ref={box}>
+    <div class="card" {...box} aria-label={label}>
       <h2>
         {label}: {word}
       </h2>

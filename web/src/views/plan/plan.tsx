@@ -59,6 +59,7 @@ export function Plan({ id }: { id: string | null }) {
           origin={origin}
           keep_mine={desk.keep_mine}
           take_theirs={() => desk.open(theirs)}
+          later={desk.decide_later}
         />
       )}
       {flown && flown.plan === plan.id && (
