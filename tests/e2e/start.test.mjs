@@ -167,6 +167,30 @@ test('the guide is there offline: every page opens, and ? opens the one for what
     await page.keyboard.press('Escape');
     await id('help').waitFor({ state: 'detached' });
   }
+  // Of a dialog or part that is open, not of the view behind it; closing it leaves what was open.
+  const part = async (title) => {
+    await page.keyboard.press('?');
+    await id('help-page').getByRole('heading', { name: title }).waitFor();
+    await page.keyboard.press('Escape');
+    await id('help').waitFor({ state: 'detached' });
+  };
+  await page.goto(`${server.url}/?theme=light#/system/connect`);
+  await id('connect-steps').waitFor();
+  await part('Connect the devices');
+  await page.goto(`${server.url}/?theme=light#/plan`);
+  await id('open-floor-plan').click();
+  await id('floor-plan').waitFor();
+  await part('Floor plans');
+  await page.keyboard.press('Escape');
+  await id('status-rtk').click();
+  await part('The status strip');
+  await page.goto(`${server.url}/?theme=light#/anchors`);
+  await id('review').click();
+  await id('publish').waitFor();
+  await part('After landing: review and publish');
+  assert.equal(await id('publish').count(), 1);
+  await page.goto(`${server.url}/?theme=light#/guide/base`);
+  await part('Base station and NTRIP');
   assert.deepEqual([...seen.hosts], [new URL(server.url).host]);
   assert.deepEqual(seen.errors, []);
   await page.close();

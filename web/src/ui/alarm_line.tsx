@@ -47,7 +47,7 @@ function Actions({ a }: { a: Alarm }) {
 
 /// All of them. While it is open every row keeps its place: a new one comes last, and what is over stays, said to be over.
 function AlarmList({ list, close }: { list: readonly Alarm[]; close: () => void }) {
-  const box = useDialog<HTMLDivElement>(close),
+  const box = useDialog<HTMLDivElement>(close, 'alarms'),
     rows = useRef(new Map<string, Alarm>()).current,
     standing = new Set(list.map((a) => a.id));
   for (const a of list) rows.set(a.id, a);

@@ -15,7 +15,7 @@ export function SignInSheet() {
   useEffect(() => {
     if (signed_out) input.current?.focus();
   }, [signed_out]);
-  const box = useDialog<HTMLElement>(close_sign_in, !signed_out);
+  const box = useDialog<HTMLElement>(close_sign_in, 'access', !signed_out);
   const submit = async (e: Event): Promise<void> => {
     e.preventDefault();
     const token = input.current?.value.trim() ?? '';

@@ -276,7 +276,7 @@ function Card({ label, word, children }: { label: string; word: string; children
   const close = (): void => {
       open_card.value = null;
     },
-    box = useDialog<HTMLDivElement>(close);
+    box = useDialog<HTMLDivElement>(close, 'strip');
   return (
     <div class="card" {...box} aria-label={label}>
       <h2>

@@ -6,11 +6,14 @@ import { useStable } from './use_stable';
 
 export interface Dialog<T extends HTMLElement> {
   readonly role: 'dialog';
+  readonly 'data-help': string;
   readonly tabIndex: -1;
   readonly ref: RefObject<T>;
 }
 
-const opened: object[] = []; ///< newest last
+const opened: { readonly help: string }[] = []; ///< newest last
+/// The page of the guide for the newest dialog; undefined where none is open.
+export const help_of_dialog = (): string | undefined => opened.at(-1)?.help;
 let focused: HTMLElement | null = null; ///< last, since a button that is disabled while it works has the focus no more
 globalThis.addEventListener?.('focusin', (e) => {
   if (e.target instanceof HTMLElement) focused = e.target;
@@ -29,13 +32,13 @@ function give_back(opener: HTMLElement | null): void {
   });
 }
 
-/// Attributes of the dialog's element. `open`: of a dialog whose component stays.
-export function useDialog<T extends HTMLElement>(close: () => void, open = true): Dialog<T> {
+/// Attributes of the dialog's element. `help`: the page of the guide for it. `open`: of a dialog whose component stays.
+export function useDialog<T extends HTMLElement>(close: () => void, help: string, open = true): Dialog<T> {
   const ref = useRef<T>(null),
     end = useStable(close);
   useEffect(() => {
     if (!open) return;
-    const me = {},
+    const me = { help },
       opener = nowhere() ? focused : (document.activeElement as HTMLElement),
       here = ref.current;
     opened.push(me);
@@ -51,6 +54,6 @@ export function useDialog<T extends HTMLElement>(close: () => void, open = true)
       opened.splice(opened.indexOf(me), 1);
       if (nowhere() || here?.contains(document.activeElement)) give_back(opener);
     };
-  }, [open, end]);
-  return { role: 'dialog', tabIndex: -1, ref };
+  }, [open, end, help]);
+  return { role: 'dialog', 'data-help': help, tabIndex: -1, ref };
 }

@@ -179,7 +179,7 @@ export function choose(part: Partial<Choice>): void {
 export function ColumnPicker({ live }: { live: boolean }) {
   const [open, set_open] = useState(false),
     box = useRef<HTMLDivElement>(null),
-    list = useDialog<HTMLDivElement>(() => set_open(false), open),
+    list = useDialog<HTMLDivElement>(() => set_open(false), 'anchors', open),
     keys = live ? choice.value.live : choice.value.published,
     name = live ? 'live' : 'published';
   useEffect(() => {

@@ -23,7 +23,7 @@ export function CompareCalibrations() {
     [against, set_against] = useState('published'),
     [rows, set_rows] = useState<readonly Shift[] | null>(null),
     [problem, set_problem] = useState(''),
-    box = useDialog<HTMLElement>(() => (compare_open.value = false));
+    box = useDialog<HTMLElement>(() => (compare_open.value = false), 'compare');
   useLoad(() => {
     if (list) return;
     solves().then(

@@ -53,7 +53,7 @@ export function Publish({ mission }: { mission: MissionMsg }) {
   const keys = useRef({ calibrate: idempotency_key(), publish: idempotency_key() }),
     [form, change, forget] = useDraft<Form>(`publish/${mission.mission}`, { note: '', reasons: {}, left: {} }),
     { note, reasons, left } = form,
-    box = useDialog<HTMLElement>(() => (publish_open.value = false));
+    box = useDialog<HTMLElement>(() => (publish_open.value = false), 'landed');
   const guarded = async (what: 'calibrating' | 'publishing' | 'planning', work: () => Promise<void>): Promise<void> => {
     set_busy(what);
     set_problem('');

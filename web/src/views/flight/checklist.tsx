@@ -26,7 +26,7 @@ export function Checklist({
     [manual, set_manual] = useState(false),
     [problem, set_problem] = useState(''),
     named_plan = useRef<string | null>(null), // which plan the server knows is to be flown
-    box = useDialog<HTMLElement>(() => (checklist_open.value = false));
+    box = useDialog<HTMLElement>(() => (checklist_open.value = false), 'preflight');
   useEffect(() => {
     refused.value = ''; // of another command
   }, []);

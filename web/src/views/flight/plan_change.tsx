@@ -30,7 +30,7 @@ async function look(p: ProcedureMsg, undo: boolean): Promise<Shown> {
 export function PlanChange({ p, undo, close }: { p: ProcedureMsg; undo: boolean; close: () => void }) {
   const [shown, set_shown] = useState<Shown | null>(null),
     [failed, set_failed] = useState(''),
-    box = useDialog<HTMLElement>(close),
+    box = useDialog<HTMLElement>(close, 'plan-change'),
     { mission, waypoint, step, plan_saved_revision, plan_revision } = p,
     mine = lease.value?.mission === mission;
   const ask = useStable(() => look(p, undo));

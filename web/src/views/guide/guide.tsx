@@ -83,9 +83,9 @@ export function Guide({ page: id }: { page: string | null }) {
   );
 }
 
-/// In the help sheet: the page for what is on the screen.
-export function GuideSheet({ hash, close }: { hash: string; close: () => void }) {
-  const page: Page = page_of(page_for(hash));
+/// In the help sheet: the page for what is on the screen, by its name or by the address of a view.
+export function GuideSheet({ page: named, close }: { page: string; close: () => void }) {
+  const page: Page = page_of(page_for(named));
   return (
     <div class="guidepage insheet" data-testid="help-page">
       <h3>{page.title}</h3>

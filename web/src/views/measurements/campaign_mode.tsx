@@ -41,7 +41,7 @@ export function CampaignMode({
     </label>
   );
   return (
-    <section class="cell-p wide take" data-testid="campaign-mode" aria-label="Label in the field">
+    <section class="cell-p wide take" data-help="campaign" data-testid="campaign-mode" aria-label="Label in the field">
       <div class="hd">
         <h2>Label in the field</h2>
         <span class="meta">

@@ -23,7 +23,7 @@ export function Promote({
     [reason, set_reason] = useState(''),
     [busy, set_busy] = useState(false),
     key = useRef(idempotency_key()),
-    box = useDialog<HTMLElement>(close);
+    box = useDialog<HTMLElement>(close, 'promote');
   useEffect(() => {
     gate_of(model).then(set_gate, (e: unknown) => set_problem(error_text(e)));
   }, [model]);

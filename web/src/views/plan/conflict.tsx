@@ -21,7 +21,7 @@ export function Conflict({
   take_theirs: () => void;
   later: () => void; ///< the next saving asks again
 }) {
-  const box = useDialog<HTMLDivElement>(later);
+  const box = useDialog<HTMLDivElement>(later, 'conflict');
   const lines = differences(mine, theirs);
   return (
     <div

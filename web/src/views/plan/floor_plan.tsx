@@ -57,7 +57,7 @@ export function FloorPlanDialog({ corners, close, use_outline }: Props) {
     [held, set_held] = useState<Held | null>(null),
     [problem, set_problem] = useState(''),
     [busy, set_busy] = useState(''),
-    box = useDialog<HTMLElement>(close);
+    box = useDialog<HTMLElement>(close, 'floor-plan');
   const work = (what: string, job: () => Promise<void>): void => {
     set_busy(what);
     set_problem('');

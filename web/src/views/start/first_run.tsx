@@ -32,7 +32,7 @@ export function FirstRun() {
   };
   const url = new URL('.', document.baseURI.split('#')[0]).toString().replace(/\/$/, '');
   return (
-    <div class="firstrun" data-testid="first-run">
+    <div class="firstrun" data-help="first" data-testid="first-run">
       <div class="start">
         <h1>No flight yet</h1>
         <p class="lead">

@@ -76,7 +76,7 @@ export function BasePanel() {
     reported = bases?.find((d) => d.base)?.base ?? null,
     admin = may('admin');
   return (
-    <section class="sys-p" data-testid="base">
+    <section class="sys-p" data-help-part="base" data-testid="base">
       <div class="hd">
         <h2>Base</h2>
         {list && list.length > 1 && (

@@ -32,7 +32,7 @@ export function LeverPanel() {
     flight.track_point !== 'tag_antenna' &&
     (flight.tags.length === 0 || flight.tags.every((t) => t.lever_arm_body_m.every((x) => x === 0)));
   return (
-    <section class="sys-p" data-testid="levers">
+    <section class="sys-p" data-help-part="lever-arm" data-testid="levers">
       <div class="hd">
         <h2>Lever arms</h2>
         {flight && (

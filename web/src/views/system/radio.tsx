@@ -71,6 +71,7 @@ export function RadioPanel({
   return (
     <form
       class="callout"
+      data-help="radio"
       data-testid="radio"
       aria-label={`Radio of ${device.name}`}
       onSubmit={(e) => {
