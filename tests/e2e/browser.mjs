@@ -60,12 +60,14 @@ export const picture = async (page, name) => {
 };
 
 const axe = readFileSync(createRequire(import.meta.url).resolve('axe-core/axe.min.js'), 'utf8');
-/** What axe finds wrong on the page as it is, and whether it is wider than its window. `sizes`: of targets too, which a bar at the bottom may half cover. */
-export async function violations(page, { sizes = false } = {}) {
+/** What axe finds wrong on the page as it is, and whether it is wider than its window. `sizes`: of targets too, which a bar at the bottom may half cover.
+ * `within`: a selector of the part that is looked at. */
+export async function violations(page, { sizes = false, within = null } = {}) {
   await page.evaluate(axe);
   const found = await page.evaluate(
-    (enabled) => globalThis.axe.run(document, { resultTypes: ['violations'], rules: { 'target-size': { enabled } } }),
-    sizes,
+    ({ enabled, part }) =>
+      globalThis.axe.run(part ?? document, { resultTypes: ['violations'], rules: { 'target-size': { enabled } } }),
+    { enabled: sizes, part: within },
   );
   const [page_px, window_px] = await page.evaluate(() => [document.documentElement.scrollWidth, innerWidth]);
   const sideways = page_px > window_px + 1 ? [`wider than its window: ${page_px} px in ${window_px}`] : [];
