@@ -257,9 +257,17 @@ function Nothing() {
     <div class="empty small">
       <p>No model has been trained for this task yet. Ranges are used as they come until one is promoted.</p>
       <p class="mut">
-        Import a campaign with ground truth, freeze a data set and post a training run; docs/cookbook.md has each step
-        with curl.
+        Record ranges with known truth first: Measure, Label in the field. An engineer then makes a data set of them and
+        trains by curl; docs/cookbook.md has each step.
       </p>
+      <span class="ways">
+        <a class="btn" href="#/measurements">
+          Go to Measure
+        </a>
+        <a class="btn" href="#/guide/campaign">
+          How to label
+        </a>
+      </span>
     </div>
   );
 }

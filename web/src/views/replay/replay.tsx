@@ -19,6 +19,7 @@ import {
   when_back,
   link,
 } from '../../state/store';
+import { may } from '../../state/session';
 import { clock, fixed, told_apart } from '../../ui/format';
 import { AlarmRow } from '../../ui/alarm_row';
 import { Chip } from '../../ui/marks';
@@ -160,14 +161,24 @@ export function Replay({ id }: { id: string | null }) {
   if (!mission)
     return (
       <div class="empty">
+        <h1 class="sr">Replay</h1>
         <p role="status">
           {synced.value && link.value !== 'lost'
-            ? 'No flight is stored under this address.'
+            ? id
+              ? 'No flight is stored under this address.'
+              : 'No flight is stored yet: the first one that is flown or imported can be replayed here.'
             : not_loaded_words(link.value)}
         </p>
-        <a class="btn" href="#/live">
-          Go to Live
-        </a>
+        <span class="ways">
+          <a class="btn" href="#/live">
+            Go to Live
+          </a>
+          {!id && may('operator') && (
+            <a class="btn" href="#/import">
+              Import a flight
+            </a>
+          )}
+        </span>
       </div>
     );
   const scene = player?.scene ?? null,

@@ -43,7 +43,9 @@ export function LeverPanel() {
         )}
       </div>
       {flight === undefined && <NotLoaded failed={failed} />}
-      {flight === null && <p class="why">They come with a flight; there is none yet.</p>}
+      {flight === null && (
+        <p class="why">Lever arms come with a flight, and there is none yet: fly one, or import one.</p>
+      )}
       {flight && <p class="why">From {POINTS[flight.track_point] ?? flight.track_point} to each UWB antenna.</p>}
       {none && (
         <div class="callout caution" role="status">
