@@ -188,7 +188,7 @@ test('Escape closes every dialog and the focus goes back; the view is reached wi
   await id('review').click();
   await id('publish').waitFor();
   await page.keyboard.press('?');
-  await id('help').waitFor();
+  await id('help-page').getByRole('heading', { name: 'After landing: review and publish' }).waitFor();
   await page.keyboard.press('Escape');
   await id('help').waitFor({ state: 'detached' });
   assert.equal(await id('publish').count(), 1);
