@@ -47,11 +47,21 @@ const unstruck = (page) =>
         if (getComputedStyle(e).textDecorationLine.includes('line-through')) return true;
       return false;
     };
+    // Sentences with a number too, but for names, limits, scales and the ages themselves.
+    const fixed =
+        'button, select, label, dt, th, h2, h3, kbd, code, figcaption, .flightname, .sr, .age, .now, .scalebar, .elevbar, .mapfoot, svg',
+      sentences = [],
+      texts = document.createTreeWalker(document.querySelector('main'), NodeFilter.SHOW_TEXT);
+    while (texts.nextNode()) {
+      const el = texts.currentNode.parentElement;
+      if (/\d/.test(texts.currentNode.data) && !el.closest(fixed) && el.checkVisibility()) sentences.push(el);
+    }
     return [...document.querySelectorAll('main :is(dd, td)')]
       .filter(
         (el) => /\d/.test(el.textContent) && !el.querySelector('button, input, select, a') && el.checkVisibility(),
       )
       .concat([...document.querySelectorAll('main .chip')].filter((el) => el.checkVisibility() && !el.closest('.now')))
+      .concat(sentences)
       .filter((el) => ![el, ...el.querySelectorAll('*')].some(struck))
       .map((el) => `${el.closest('[data-testid]')?.dataset.testid}: ${el.textContent.trim()}`);
   });

@@ -40,7 +40,9 @@ export function Procedure() {
       <div class="hd">
         <h2>Procedure</h2>
         {stale && flying(p) ? (
-          <Chip shape="off" tone="off" word="LAST KNOWN" />
+          <span class="now">
+            <Chip shape="off" tone="off" word="LAST KNOWN" />
+          </span>
         ) : (
           <Chip shape={shape} tone={tone} word={word} />
         )}
