@@ -205,7 +205,7 @@ function read(): Readings {
                   ? craft_words(craft)
                   : 'Nothing has been received from the aircraft for 3 s. It follows its own failsafe; use the remote control.'}
               </p>
-              {craft.text && <p>It says: {craft.text}</p>}
+              {craft.text && <p>The autopilot reports: {craft.text}</p>}
             </>
           ),
         }

@@ -71,7 +71,7 @@ export function CompareCalibrations() {
       </div>
       {!list && <NotLoaded failed={problem !== ''} />}
       {list?.length === 0 ? (
-        <p class="why">Nothing was solved yet: Review and publish makes the first calibration.</p>
+        <p class="why">No flight is calibrated yet: Review and publish makes the first calibration.</p>
       ) : (
         list && (
           <div class="comparing">

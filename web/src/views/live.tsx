@@ -29,7 +29,7 @@ import './flight/field.css';
 import './flight/flight.css';
 import { FlightBar } from './flight/commands';
 import { flight_picture, follow_plan } from './flight/picture';
-import { Clues, NextPoint, Procedure } from './flight/procedure';
+import { TurnAndHeight, NextPoint, Procedure } from './flight/procedure';
 import { RangeList } from './range_list';
 
 export function content(): Content {
@@ -79,7 +79,7 @@ export function Live() {
       <aside class="side" aria-label="Flight, ranges, selected anchor" tabIndex={0}>
         <Procedure />
         <NextPoint />
-        <Clues />
+        <TurnAndHeight />
         <Progress />
         <RangeList selected={selected} />
         {selected && <AnchorCard anchor={selected} />}

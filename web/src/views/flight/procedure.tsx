@@ -74,7 +74,7 @@ export function Procedure() {
         p.reason && <p class="why says">{sentence(p.reason)}</p>
       )}
       {(p.status === 'done' || p.status === 'aborted') && <AfterLanding mission={p.mission} />}
-      {p.ended && flying(p) && p.ended !== p.reason && <p class="why says">Why it comes home: {p.ended}.</p>}
+      {p.ended && flying(p) && p.ended !== p.reason && <p class="why says">Why it returns: {p.ended}.</p>}
       {p.drone?.taken_over && (
         <div class="callout caution">
           <b>The pilot has taken over by remote control.</b> No target is sent until the flight is started or resumed
@@ -151,7 +151,10 @@ function NotDone({ p }: { p: ProcedureMsg }) {
             <b>{a.anchor}</b> {a.why}
             {a.at_edge && <span class="sub"> Its height lies at an end of the height search, perhaps beyond.</span>}
             {a.no_lobe && (
-              <span class="sub"> The turn saw no lobe of it from this far: no height search until it is nearer.</span>
+              <span class="sub">
+                {' '}
+                The turn showed no direction to it from this distance: no height search until it is nearer.
+              </span>
             )}
           </li>
         ))}
@@ -248,7 +251,7 @@ function Ramp({ g }: { g: GridMsg }) {
   );
 }
 
-export function Clues() {
+export function TurnAndHeight() {
   tick.value;
   const scene = current_scene(),
     step = scene?.procedure?.value.step;

@@ -53,7 +53,7 @@ export const PAGES: readonly Page[] = [
     blocks: [
       {
         p:
-          'The UWB tag measures distances, the RTK receiver says where it is. Both are fixed to the aircraft so that neither moves ' +
+          'The UWB tag measures distances, the RTK receiver its own position. Both are fixed to the aircraft so that neither moves ' +
           'against the other.',
       },
       {
@@ -83,7 +83,7 @@ export const PAGES: readonly Page[] = [
           'Put the aircraft level. Forward is where its nose points.',
           "Measure from the middle of the GNSS antenna's phase centre (its label gives the height above the mount) to the middle of the tag's antenna.",
           'Forward and left are positive; below the antenna is negative. Example: 12 cm ahead, 28 cm below is 0.12, 0, −0.28.',
-          'Type it in System, Lever arms. It is kept with each flight.',
+          'Give it with the flight: in flight.json, on the page of the import, or as tags of POST /missions. System, Lever arms shows what a flight has.',
         ],
       },
       { h: 'Check' },
@@ -319,7 +319,7 @@ export const PAGES: readonly Page[] = [
           'σ is one sigma; ± and ellipses are 95 %.',
           'Relative is against the base; absolute adds how well the base itself is known.',
           'Acceptance gates: each with its value and limit. One that fails withholds the anchor.',
-          'Residuals: what each range says against the answer. A curve over bearing is a lever arm or a wall.',
+          'Residuals: how far each range is from the solution. A curve over bearing is a lever arm or a wall.',
         ],
       },
     ],
@@ -375,7 +375,7 @@ export const PAGES: readonly Page[] = [
     blocks: [
       {
         p:
-          'A model says of each range whether it came through a wall, and how much too long it is. Without one, class reads unclear' +
+          'A model predicts of each range whether it came through a wall, and how much too long it is. Without one, class reads unclear' +
           ' and nothing is corrected.',
       },
       {
@@ -481,7 +481,7 @@ export const PAGES: readonly Page[] = [
         p: 'Withheld means: measured, and not good enough to be published. Its reason is in the review and in its detail.',
       },
       {
-        head: ['It says', 'It means', 'Do'],
+        head: ['Reason', 'Meaning', 'Do'],
         rows: [
           [
             'Ambiguous',

@@ -54,8 +54,8 @@ export function CampaignMode({
         </button>
       </div>
       <p class="why">
-        Stand still, type what the laser metre says, press Record. The next ranges of the anchor join the campaign with
-        this truth. The form stays filled in for the next place.
+        Stand still, type the distance that the laser metre shows, press Record. The next ranges of the anchor join the
+        campaign with this truth. The form stays filled in for the next place.
       </p>
       <datalist id="campaign-names">
         {campaigns.map((c) => (

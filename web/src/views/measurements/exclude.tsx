@@ -205,7 +205,7 @@ export function ExcludePanel({
                       disabled={busy}
                       onClick={() => void act(() => include(mission, e.id, key.current), 'Used again')}
                     >
-                      Re-include
+                      Use again
                     </button>
                   ) : (
                     'out of use'

@@ -78,8 +78,11 @@ export function Models({ path }: { path: string | null }) {
             <h1>{chosen ? method_words(chosen.method) : 'Models'}</h1>
             {chosen && (
               <span class="mut">
-                run {chosen.id.slice(0, 8)}, {chosen.dataset}
-                {chosen.seconds === null ? '' : `, ${fixed(chosen.seconds, 0)} s`}, {chosen.created_by}
+                run {chosen.id.slice(0, 8)} on data set {chosen.dataset},{' '}
+                {chosen.seconds === null
+                  ? 'begun'
+                  : `trained in ${chosen.seconds < 1 ? 'less than 1' : fixed(chosen.seconds, 0)} s`}{' '}
+                by {chosen.created_by}
               </span>
             )}
             {chosen && <StateChip run={chosen} active={active} />}
@@ -225,7 +228,7 @@ function Numbers({ run, numbers }: { run: Run; numbers: RunNumbers }) {
           <p class="why">
             {why_words(run.why)}
             {run.nll !== null &&
-              `. Mean negative log-likelihood on held-out places ${fixed(run.nll, 3)}, constants ${fixed(run.nll_constants, 3)}.`}
+              `. Mean negative log-likelihood on held-out places ${fixed(run.nll, 3)}, of a constant prediction ${fixed(run.nll_constants, 3)}.`}
           </p>
         </section>
       )}

@@ -164,7 +164,7 @@ export function RoverTools({
           data-testid="walk-outline"
           aria-pressed={walk !== null}
           disabled={walk === null && missing !== ''}
-          title={missing || 'Carry the rover once round, then stop: the corners are found'}
+          title={missing || 'Carry the rover once round the building, then stop: the corners are found'}
           onClick={() => (walk === null ? set_walk(scene?.pose?.value.t_us ?? 0) : stop())}
         >
           {walk !== null ? `Stop walking (${fixed(length_m, 0)} m)` : 'Walk it'}

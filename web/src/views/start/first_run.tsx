@@ -76,7 +76,7 @@ export function FirstRun() {
               <h2>Bring a flight</h2>
               <p>
                 A folder, tables (.csv) or an archive (.zip) of a flight that was flown already. Columns with other
-                names are told on a page.
+                names are assigned on a page.
               </p>
               <a class="btn primary" href="#/import" data-testid="import-flight">
                 Import a flight

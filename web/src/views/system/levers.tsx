@@ -49,9 +49,9 @@ export function LeverPanel() {
       {flight && <p class="why">From {POINTS[flight.track_point] ?? flight.track_point} to each UWB antenna.</p>}
       {none && (
         <div class="callout caution" role="status">
-          <b>Not set.</b> The UWB antenna counts as being at {POINTS[flight.track_point]}. Measure the way between the
-          two and give it with the next flight (tags of POST /missions): every centimetre of it is a centimetre of each
-          anchor.
+          <b>Not set.</b> The UWB antenna counts as being at {POINTS[flight.track_point]}. Measure from there to the UWB
+          antenna and give it with the next flight (tags of POST /missions, or the page of the import): every centimetre
+          of it is a centimetre of each anchor.
         </div>
       )}
       {flight && flight.tags.length > 0 && (

@@ -183,7 +183,7 @@ export function RadioPanel({
         )}
       </div>
       {changed && busy === '' && (
-        <p class="mut">Where one device does not follow, all go back to the settings of now.</p>
+        <p class="mut">Where one device does not follow, all go back to their present settings.</p>
       )}
     </form>
   );
