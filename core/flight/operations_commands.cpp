@@ -236,7 +236,7 @@ Result<FlightCommand> Operations::act(const Now& now, const MissionId& mission, 
 Result<DroneStatus> Operations::change_aircraft(const MissionId& mission, const std::string& sender,
                                                 const std::string& who) {
   if (drone_ == nullptr)
-    return make_error(Errc::invalid_argument, "this server talks to no autopilot (drone.address)");
+    return make_error(Errc::invalid_argument, "this server has no link to an autopilot (drone.address)");
   const auto before = drone_->status();
   if (before.connected && (before.in_air || flying()))
     return make_error(Errc::invalid_argument,

@@ -145,14 +145,14 @@ std::optional<Alarm> watch(const SafetyLimits& limits, const Situation& now) {
   }
   if (now.battery_warning >= 2) {
     return Alarm{Reaction::land, false, "drone.battery",
-                 "the autopilot says the battery is critical: landing here"};
+                 "the autopilot reports a critical battery: landing here"};
   }
   if (now.cell_v && *now.cell_v <= limits.critical_cell_v) {
     return Alarm{Reaction::land, false, "drone.battery",
                  text("battery at %.2f V a cell: landing here", *now.cell_v)};
   }
   if (now.battery_warning == 1) {
-    return Alarm{Reaction::return_home, false, "drone.battery", "the autopilot says the battery is low"};
+    return Alarm{Reaction::return_home, false, "drone.battery", "the autopilot reports a low battery"};
   }
   if (now.cell_v && *now.cell_v <= limits.low_cell_v) {
     return Alarm{Reaction::return_home, false, "drone.battery",

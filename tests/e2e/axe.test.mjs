@@ -1,14 +1,14 @@
 // What axe finds, in every view, every theme and every size: nothing, the sizes of targets among it. One server with something in each view.
 import assert from 'node:assert/strict';
 import { after, before, test } from 'node:test';
-import { openBrowser, openPage, picture, violations } from './browser.mjs';
+import { openBrowser, openPage, picture, text, violations } from './browser.mjs';
 import { fullServer, sizes, views } from './full_server.mjs';
 import { eventually } from './server.mjs';
 
-let browser, server;
+let browser, server, mission;
 
 before(async () => {
-  ({ server } = await fullServer());
+  ({ server, mission } = await fullServer());
   browser = await openBrowser();
 });
 after(async () => {
@@ -47,6 +47,47 @@ for (const theme of ['light', 'dark', 'sun'])
     assert.deepEqual(found, []);
     await page.close();
   });
+
+test('no page of the guide, no state of Help and none of Replay breaks one, on a phone', async () => {
+  const [, width, height] = sizes.at(-1),
+    { page, id } = await openPage(browser, server, { hash: '#/guide', width, height }),
+    found = [];
+  const look = async (state, within = null) => {
+    found.push(...(await violations(page, { sizes: true, within })).map((v) => `${state}: ${v}`));
+    await picture(page, `axe-state-${state.replaceAll(/\W+/g, '-')}`);
+  };
+  await id('guide').waitFor({ timeout: 20_000 });
+  const links = await id('guide')
+    .locator('nav a')
+    .evaluateAll((all) => all.map((a) => [a.hash, a.textContent]));
+  for (const [hash, title] of links) {
+    await page.evaluate((to) => (location.hash = to), hash);
+    await id('guide').getByRole('heading', { level: 1, name: title, exact: true }).waitFor();
+    await look(`guide, ${title}`, 'article'); // its list of pages is held above
+  }
+  for (const view of ['live', 'replay', 'system']) {
+    await page.goto(`${server.url}/?theme=light#/${view}`);
+    await eventually(`${view} is there`, () => id(view).isVisible(), 20_000);
+    await page.keyboard.press('?');
+    await id('help-page').waitFor();
+    await look(`help over ${view}`, '[data-testid="help"]');
+    await page.keyboard.press('Escape');
+  }
+  await page.goto(`${server.url}/?theme=light#/replay/${mission.id}?t=20`);
+  await eventually('the flight is read', async () => /\d/.test(await text(id('replay-time'))), 20_000);
+  await eventually('its anchors', async () => (await id('anchor-card').count()) === 1, 20_000);
+  await look('replay at a moment');
+  await id('play').click();
+  await look('replay playing');
+  await id('play').click();
+  await id('show-elevation').click();
+  await look('replay from the side');
+  await page.goto(`${server.url}/?theme=light#/replay/0197a3b0-5d10-7b1e-9c55-0a1b2c3d4e5f`);
+  await page.getByText('No flight is stored under this address').waitFor();
+  await look('replay of no flight');
+  assert.deepEqual(found, []);
+  await page.close();
+});
 
 test('the page of the API breaks none either', async () => {
   const page = await browser.context.newPage(),

@@ -1,4 +1,5 @@
 // Chromium for browser tests. Debian's own, found by path; the flags keep it from calling home.
+import assert from 'node:assert/strict';
 import { existsSync, mkdtempSync, readFileSync, rmSync } from 'node:fs';
 import { createRequire } from 'node:module';
 import { tmpdir } from 'node:os';
@@ -59,16 +60,36 @@ export const picture = async (page, name) => {
 };
 
 const axe = readFileSync(createRequire(import.meta.url).resolve('axe-core/axe.min.js'), 'utf8');
-/** What axe finds wrong on the page as it is, and whether it is wider than its window. `sizes`: of targets too, which a bar at the bottom may half cover. */
-export async function violations(page, { sizes = false } = {}) {
+/** What axe finds wrong on the page as it is, and whether it is wider than its window. `sizes`: of targets too, which a bar at the bottom may half cover.
+ * `within`: a selector of the part that is looked at. */
+export async function violations(page, { sizes = false, within = null } = {}) {
   await page.evaluate(axe);
   const found = await page.evaluate(
-    (enabled) => globalThis.axe.run(document, { resultTypes: ['violations'], rules: { 'target-size': { enabled } } }),
-    sizes,
+    ({ enabled, part }) =>
+      globalThis.axe.run(part ?? document, { resultTypes: ['violations'], rules: { 'target-size': { enabled } } }),
+    { enabled: sizes, part: within },
   );
   const [page_px, window_px] = await page.evaluate(() => [document.documentElement.scrollWidth, innerWidth]);
   const sideways = page_px > window_px + 1 ? [`wider than its window: ${page_px} px in ${window_px}`] : [];
   return [...found.violations.map((v) => `${v.id}: ${v.nodes.map((n) => n.target.join(' ')).join(', ')}`), ...sideways];
+}
+
+/** Opened by Enter on its opener, a dialog has the focus; Escape closes it, and the opener, or what is there in its place, has the focus again. */
+export async function opensByKeys(page, opener, dialog) {
+  await opener.focus();
+  await page.keyboard.press('Enter');
+  await dialog.waitFor();
+  const has_focus = (locator) => locator.evaluate((e) => e.contains(document.activeElement)),
+    waited = async (what, when) => assert.ok(await until(when, 3000), what);
+  await waited('the dialog has the focus', () => has_focus(dialog));
+  await page.keyboard.press('Escape');
+  await dialog.waitFor({ state: 'detached' });
+  await waited('the focus is back', () => has_focus(opener));
+}
+async function until(when, ms) {
+  for (const end = Date.now() + ms; Date.now() < end; await new Promise((go) => setTimeout(go, 50)))
+    if (await when()) return true;
+  return when();
 }
 
 /** Text of the first match; empty while there is none. */

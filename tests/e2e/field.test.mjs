@@ -141,9 +141,32 @@ test('the rover is on the map of the plan: a corner is set where it is, and an o
       assert.ok(off < 0.3, `${off} m from the track`);
     }
     assert.deepEqual(seen.errors, []);
+    // With the link lost the plan stays as it is drawn; what is of now on it is struck and aged, on the map and from the side.
+    process.kill(server.pid, 'SIGSTOP');
+    try {
+      await eventually('LOST', async () => (await text(id('status-link'))).includes('LOST'), 12_000);
+      await eventually(
+        'the rover is struck and aged',
+        async () => /rover FIX \d+ s old/.test(await text(id('plan-rover'))),
+        5000,
+      );
+      const struck = (at) => at.evaluate((e) => getComputedStyle(e).textDecorationLine.includes('line-through'));
+      assert.equal(await struck(id('plan-rover').locator('tspan')), true);
+      assert.match(await id('elevation').getByRole('img').getAttribute('aria-label'), /values are the last known/);
+      for (const tile of ['rtk', 'uwb', 'drone', 'rec', 'alarms']) {
+        assert.match(await text(id(`status-${tile}`)), /\d+ s old/, tile);
+        assert.equal(await struck(id(`status-${tile}`).locator('b')), true, tile);
+      }
+      await picture(page, 'lost-plan');
+    } finally {
+      process.kill(server.pid, 'SIGCONT');
+    }
+    await eventually('LIVE', async () => (await text(id('status-link'))).includes('LIVE'), 20_000);
     // The link to the rover is not forever: it ages, and no corner can be set any more.
     playing.kill('SIGINT');
-    await id('plan-rover').getByText('last known').waitFor({ timeout: 20_000 });
+    await id('plan-rover')
+      .getByText(/\d+ s old/)
+      .waitFor({ timeout: 20_000 });
     assert.equal(await id('walk-outline').isEnabled(), false);
     await page.close();
   } finally {

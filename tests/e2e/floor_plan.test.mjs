@@ -1,7 +1,7 @@
 // The plan of a floor in the browser: sent, placed by clicked points with their residuals, under the map of the plan, traced, its outline taken over.
 import assert from 'node:assert/strict';
 import { after, before, test } from 'node:test';
-import { openBrowser, openPage, picture, text, violations } from './browser.mjs';
+import { openBrowser, openPage, opensByKeys, picture, text, violations } from './browser.mjs';
 import { room_png } from './room.mjs';
 import { eventually, startServer } from './server.mjs';
 
@@ -31,6 +31,7 @@ test('a person sends a plan, clicks points, sees residuals, places it, traces it
   await id('where').press('Enter');
   await id('plan-map').waitFor();
   assert.equal(await id('level').count(), 0, 'no plan is placed: nothing to choose');
+  await opensByKeys(page, id('open-floor-plan'), id('floor-plan'));
   await id('open-floor-plan').click();
   await id('floor-building').fill('B1');
   await id('floor-name').fill('Ground floor');

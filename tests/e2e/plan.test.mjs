@@ -4,7 +4,7 @@ import { mkdtempSync, rmSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { after, before, test } from 'node:test';
-import { openBrowser, openPage, picture, text, violations } from './browser.mjs';
+import { openBrowser, openPage, opensByKeys, picture, text, violations } from './browser.mjs';
 import { eventually, run, startServer } from './server.mjs';
 
 const folder = mkdtempSync(join(tmpdir(), 'anchord plan '));
@@ -164,6 +164,7 @@ test('waypoints are spaced evenly and made denser, judged while they are drawn, 
     200,
   );
   await id('plan-name').fill('Hall D');
+  await opensByKeys(page, id('save'), id('conflict')); // decided later: the next saving asks again
   await id('save').click();
   const lines = id('differences').locator('tbody tr');
   await lines.first().waitFor();

@@ -2,7 +2,7 @@
 // difference is shown, refused where it is not safe, flown once confirmed, undone.
 import assert from 'node:assert/strict';
 import { after, before, test } from 'node:test';
-import { openBrowser, openPage, picture, text, violations } from './browser.mjs';
+import { openBrowser, openPage, opensByKeys, picture, text, violations } from './browser.mjs';
 import { eventually } from './server.mjs';
 import { serverWithAircraft, startFlight } from './simulated_aircraft.mjs';
 
@@ -59,6 +59,8 @@ test('a saved revision waits, is shown as a difference, flown once confirmed, an
   await id('control').getByText('You have control').waitFor();
   const { n_waypoints: n, waypoint } = await procedure();
   await save((p) => p.waypoints.pop());
+  await id('plan-review').waitFor();
+  await opensByKeys(page, id('plan-review'), id('plan-change')); // its button is gone meanwhile
   await id('plan-review').click();
   await eventually('the difference', async () =>
     (await text(id('plan-lines'))).includes(`Waypoint ${n} of the flown plan removed`),

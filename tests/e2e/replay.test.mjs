@@ -64,6 +64,9 @@ test('. and , step through the events in the order of the flight, each at its ow
       `the event of that moment: ${words}`,
     );
   }
+  // The rows of the list are those of Live: with the mark of their level.
+  const rows = id('replay-events').locator('li');
+  assert.equal(await rows.locator('> .mark').count(), await rows.count());
   await picture(page, 'replay-last-event');
   const back = [];
   while (back.length < forth.length - 1) {

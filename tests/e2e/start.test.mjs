@@ -24,6 +24,29 @@ after(async () => {
   rmSync(folder, { recursive: true, force: true });
 });
 
+test('every view of an empty server says what to do next, and on a phone the rail stays at the bottom', async () => {
+  const { page, seen, id } = await openPage(browser, server, { width: 390, height: 844 });
+  await id('first-run').waitFor();
+  for (const [view, next] of [
+    ['plan', page.getByRole('button', { name: 'Draw here' })],
+    ['anchors', page.getByRole('link', { name: 'Import a flight' })],
+    ['measurements', page.getByRole('link', { name: 'Import a flight' })],
+    ['models', page.getByRole('link', { name: 'Go to Measure' })],
+    ['replay', page.getByRole('link', { name: 'Import a flight' })],
+    ['system', page.getByRole('button', { name: 'Add a device' })],
+  ]) {
+    await id(`nav-${view}`).click();
+    await next.waitFor();
+    const rail = await page.getByRole('navigation', { name: 'Views' }).boundingBox();
+    assert.ok(Math.abs(rail.y + rail.height - 844) < 2, `${view}: the rail ends at ${rail.y + rail.height}`);
+    assert.equal(await page.getByRole('heading', { level: 1 }).count(), 1, view);
+    await picture(page, `empty-${view}`);
+  }
+  assert.doesNotMatch(await text(page.getByRole('main')), /under this address/);
+  assert.deepEqual(seen.errors, []);
+  await page.close();
+});
+
 test('an empty server offers three ways; the demonstration flies at one press, and its anchors converge', async () => {
   const { page, seen, id } = await openPage(browser, server);
   await id('first-run').waitFor();
@@ -254,6 +277,27 @@ test('the guide is there offline: every page opens, and ? opens the one for what
     await page.keyboard.press('Escape');
     await id('help').waitFor({ state: 'detached' });
   }
+  // Of a dialog or part that is open, not of the view behind it; closing it leaves what was open.
+  const part = async (title) => {
+    await page.keyboard.press('?');
+    await id('help-page').getByRole('heading', { name: title }).waitFor();
+    await page.keyboard.press('Escape');
+    await id('help').waitFor({ state: 'detached' });
+  };
+  await page.goto(`${server.url}/?theme=light#/system/connect`);
+  await id('connect-steps').waitFor();
+  await part('Connect the devices');
+  await page.goto(`${server.url}/?theme=light#/plan`);
+  await id('open-floor-plan').click();
+  await id('floor-plan').waitFor();
+  await part('Floor plans');
+  await page.keyboard.press('Escape');
+  await id('status-rtk').click();
+  await part('The status strip');
+  await page.keyboard.press('Escape');
+  await page.goto(`${server.url}/?theme=light#/guide/base`);
+  await id('guide').waitFor();
+  await part('Base station and NTRIP');
   assert.deepEqual([...seen.hosts], [new URL(server.url).host]);
   assert.deepEqual(seen.errors, []);
   await page.close();

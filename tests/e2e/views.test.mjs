@@ -4,7 +4,7 @@ import { mkdtempSync, readFileSync, rmSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { after, before, test } from 'node:test';
-import { openBrowser, openPage, picture, text, violations } from './browser.mjs';
+import { openBrowser, openPage, opensByKeys, picture, text, violations } from './browser.mjs';
 import { eventually, root, run, startServer } from './server.mjs';
 
 const folder = mkdtempSync(join(tmpdir(), 'anchord views '));
@@ -121,8 +121,9 @@ test('the plain rules stand beside the learned models, with the rates of the API
 
 test('a model is promoted past the gate, takes effect, and is rolled back by one press', async () => {
   const { page, id } = await openPage(browser, server, { hash: `#/models/runs/${training.id}` });
-  await id('promote').click();
   const dialog = id('promote-dialog');
+  await opensByKeys(page, id('promote'), dialog);
+  await id('promote').click();
   await dialog.getByText(/GATE (NOT )?PASSED/).waitFor();
   assert.deepEqual(await violations(page), []);
   const reason = dialog.getByRole('textbox');

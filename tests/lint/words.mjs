@@ -25,6 +25,25 @@ export const FORBIDDEN = [
   [/\bfront door\b/i, 'authenticator'],
   [/\bthe house\b/i, 'the codebase'],
   [/\btempered cost\b|\bloss tukey\b/i, 'a sentence with value and limit'],
+  [/\bat all costs?\b|\bcost (%|[+−-]?\d)/i, 'misfit; what makes it bad'],
+  [/\b(signal|first-path) levels?\b|\b(no|a) level( for a line|,)/i, 'RSS, first-path power'],
+  [
+    /\b(it|tag|receiver|module|device) (talks|spoke|says nothing)\b|\b(autopilot|laser metre) says\b|\bit says: |\btalks to no\b/i,
+    'reports, sends, shows, answers, is connected',
+  ],
+  [/\bspeaks as (?!PX4)|\bnothing known spoke\b|\blistened to\b/i, 'identifies itself as, answers, is measured'],
+  [/\btakes? the order\b/i, 'accept the command'],
+  [
+    /\b(range|epoch|position) (before )?once more\b|\bthat cannot be\b(?! \w)/i,
+    'a repeated range, an impossible position',
+  ],
+  [/\bgarbage comes\b/i, 'unreadable bytes come'],
+  [/\bnobody (said|asked)\b|\bwas not said\b|\bsaid class\b/i, 'is not stated, unexpected, predicted'],
+  [/\branges? to doubt\b|\bminus explained\b/i, 'to check, computed'],
+  [
+    /\b(as|what) (it|they) was dropped\b|\b(what|rows?|messages?) (was|were) dropped\b/i,
+    'rejected (with a reason); dropped of a full queue',
+  ],
   [/\bobey(s|ed)?\b/i, 'apply'],
   [/\bsuffic(e|es|ed)\b/i, 'cover, be enough'],
   [/\b(tell|tells|told|telling)\b/i, 'report, show, publish, notify, log'],
@@ -57,7 +76,7 @@ export function* literals(text, { jsx = false } = {}) {
   if (!jsx) return;
   // Text between tags and expressions; comments keep their lines and lose their words.
   const bare = text.replace(/\/\/[^\n]*|\/\*[\s\S]*?\*\//g, (c) => c.replace(/[^\n]/g, ' '));
-  for (const match of bare.matchAll(/(?<=[>}])([^<>{}=;()[\]]*[A-Za-z][^<>{}=;()[\]]*)(?=[<{])/g))
+  for (const match of bare.matchAll(/(?<=[>}])([^<>{}=;[\]]*[A-Za-z][^<>{}=;[\]]*)(?=[<{])/g))
     if (/\s/.test(match[1].trim())) yield [line_of(match.index + match[1].search(/\S/)), match[1]];
 }
 

@@ -25,6 +25,19 @@ test('text and attributes of the dashboard are read, names of classes and proper
   ];
   assert.deepEqual(hits(literals(source.join('\n'), { jsx: true })).sort(), [2, 4, 5]);
 });
+test('text with parentheses is read, and what is written of a thing as of a person is found', () => {
+  const source = [
+    '<p>',
+    '  Tables (.csv) whose names are told on a page',
+    '</p>',
+    '<p>{"The receiver talks, but it has no position"}</p>',
+    '<p>the tag says nothing (yet)</p>',
+    'text("mirror: a solution %.2f m away fits as well (cost %+.2f)")',
+    '<p>the worst error, at all cost</p>',
+    '<p>Garbage comes between its messages</p>',
+  ];
+  assert.deepEqual([...new Set(hits(literals(source.join('\n'), { jsx: true })))].sort(), [2, 4, 5, 6, 7, 8]);
+});
 test('descriptions, summaries and titles of a contract are read, wherever they are', () => {
   const contract = { paths: { '/heard': { get: { summary: 'Radios that were heard', tags: ['heard them'] } } } };
   assert.deepEqual(hits(sayings(contract)), ['/paths//heard/get/summary']);

@@ -1,4 +1,4 @@
-import { readFileSync } from 'node:fs';
+import { readdirSync, readFileSync } from 'node:fs';
 import { deflateRawSync, gzipSync } from 'node:zlib';
 import { describe, expect, it } from 'vitest';
 import { guessed_ranges, guessed_track, missing_ranges, missing_track } from '../src/views/start/fields';
@@ -351,6 +351,25 @@ describe('the guide', () => {
     expect(views).toHaveLength(7);
     for (const v of views) expect(page_for(`#/${v}/something`)).toBe(v);
     expect(page_for('')).toBe('live');
+  });
+  it('has a page for every dialog, and for every part of a view that names one', () => {
+    const src = new URL('../src/', import.meta.url),
+      text = readdirSync(src, { recursive: true, encoding: 'utf8' })
+        .filter((f) => f.endsWith('.tsx'))
+        .map((f) => readFileSync(new URL(f, src), 'utf8'))
+        .join(''),
+      named = [
+        ...text.matchAll(/useDialog<\w+>\([^;]*?'([\w-]+)'(?:, [^;]*?)?\)[,;]/g),
+        ...text.matchAll(/data-help(?:-part)?="([\w-]+)"/g),
+      ].map((m) => m[1]!);
+    expect(named.length).toBeGreaterThan(18);
+    for (const page of named.filter((n) => n !== 'help')) expect(page_for(page), page).toBe(page);
+  });
+  it('has the page of a part at its address, and itself', () => {
+    expect(page_for('#/system/connect')).toBe('connect');
+    expect(page_for('#/system')).toBe('system');
+    expect(page_for('#/guide/base')).toBe('base');
+    expect(page_for('#/replay/0197a3b0?t=12')).toBe('replay');
   });
   it('names every page once', () => {
     expect(new Set(PAGES.map((p) => p.id)).size).toBe(PAGES.length);

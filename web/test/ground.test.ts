@@ -71,13 +71,21 @@ describe('an outline walked with the rover', () => {
     const at = (fix: string, age_ms: number) => {
       const s = new Scene('m');
       s.add_pose(pose({ mission: 'm', t_us: 1e6, ...origin, fix, enu_m: [0, 0, 5] })!, 10_000);
-      return rover_of(s, origin, 10_000 + age_ms);
+      return rover_of(s, origin, 10_000 + age_ms, false);
     };
     expect(no_corner(at('fixed', 0))).toBe('');
     expect(no_corner(at('float', 0))).toBe('');
     expect(no_corner(null)).toMatch(/no position/);
     expect(no_corner(at('single', 0))).toMatch(/FIX or FLOAT/);
     expect(no_corner(at('fixed', 2500))).toMatch(/silent/);
+  });
+  it('sets no corner and shows nothing as fresh while the link is lost, however lately the position came', () => {
+    const s = new Scene('m');
+    s.add_pose(pose({ mission: 'm', t_us: 1e6, ...origin, fix: 'fixed', enu_m: [0, 0, 5] })!, 10_000);
+    const rover = rover_of(s, origin, 10_400, true);
+    expect(rover).toMatchObject({ fresh: false, age_ms: 400 });
+    expect(no_corner(rover)).toMatch(/silent/);
+    expect(rover_of(s, origin, 10_400, false)!.fresh).toBe(true);
   });
 });
 
@@ -97,7 +105,8 @@ describe('the plan from the side', () => {
     // The plan says where its ground is: 55 m above the ellipsoid; the aircraft at 60 m is 5 m above it.
     const plan = { ...EMPTY, rest: { origin: { lon: origin.lon, lat: origin.lat, h_m: 55 } } },
       near = around(plan, origin, flight, scene)!;
-    const made = plan_content(plan, origin, scene, near, new Map(), true, null).scene!.pose!.value.enu_m!;
+    const flying = { running: true, link_lost: false };
+    const made = plan_content(plan, origin, scene, near, new Map(), flying, null).scene!.pose!.value.enu_m!;
     expect(made[0]).toBeCloseTo(40, 3);
     expect(made[1]).toBeCloseTo(10, 3);
     expect(made[2]).toBeCloseTo(5, 9);

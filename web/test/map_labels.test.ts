@@ -11,7 +11,9 @@ import { numbered } from '../src/map/flight_layer';
 import { palette_of, type Palette } from '../src/map/palette';
 import { mark_trail, trail_stands, type Content } from '../src/map/picture';
 import { Scene } from '../src/state/scene';
+import { by_priority } from '../src/map/label_order';
 import { beyond, free_place, type Box } from '../src/map/symbols';
+import { estimate, type AnchorStatus } from '../src/live/messages';
 
 const overlap = (a: Box, b: Box): boolean => a.x < b.x + b.w && b.x < a.x + a.w && a.y < b.y + b.h && b.y < a.y + a.h;
 
@@ -45,6 +47,29 @@ describe('labels of the map', () => {
       expect([box.x >= 0, box.y >= 0, box.x + box.w <= 800, box.y + box.h <= 600]).toEqual([true, true, true, true]);
     }
     expect(free_place(40, 10, 12, 90, 26, beyond(80, 20))).toBeNull(); // nor squeezed in where there is no room
+  });
+});
+
+describe('names in a crowd', () => {
+  const at = (anchor: string, status: AnchorStatus, e: number) => ({
+    ...estimate({ mission: 'm', anchor, t_us: 1, verdict: 'ok', enu_m: [e, 0, 0] })!,
+    status,
+  });
+  const all = [
+    at('0x01', 'accepted', 0),
+    at('0x02', 'estimating', 30),
+    at('0x03', 'converged', 1),
+    at('0x04', 'ambiguous', 2),
+    at('0x05', 'gave_up', 3),
+    at('0x06', 'estimating', 9),
+  ];
+  const ids = (selected: string | null, target: [number, number] | null) =>
+    by_priority(all, selected, target).map((a) => a.anchor);
+  it('have their room in this order: selected, measured next, not done, done', () => {
+    expect(ids('0x03', [10, 0])).toEqual(['0x03', '0x06', '0x04', '0x02', '0x01', '0x05']);
+  });
+  it('are in the order of their ids where nothing is flown, so that none moves with a reading', () => {
+    expect(ids(null, null)).toEqual(['0x02', '0x04', '0x06', '0x01', '0x03', '0x05']);
   });
 });
 

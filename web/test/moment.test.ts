@@ -37,13 +37,14 @@ it('begins anew with a second flight of the same mission', () => {
   const second = [...marks, at(60, 'procedure.done', 'landed'), at(90, 'procedure.take_off', 'started again')];
   expect(procedure_at(second, 91e6)).toMatchObject({ step: 'take_off', started_us: 90e6, iteration: 0, reached: [] });
 });
-it('has the alarms that stood then, with since when', () => {
+it('has the alarms that stood then as the list of Live has them, with since when by the clock of the flight', () => {
+  const known = { advice: '', acknowledged: false };
   expect(alarms_at(marks, 21e6)).toEqual([]);
   expect(alarms_at(marks, 23e6)).toEqual([
-    { id: 'rtk.lost', level: 'critical', text: 'no RTK for 2.1 s', since_us: 22e6 },
+    { id: 'rtk.lost', priority: 'critical', title: 'no RTK for 2.1 s', since_ms: 22e3, ...known },
   ]);
   expect(alarms_at(marks, 26e6)).toEqual([]);
   expect(alarms_at(marks, 41e6)).toEqual([
-    { id: 'uwb.none', level: 'warning', text: 'no range for 5 s: check the tag', since_us: 40e6 },
+    { id: 'uwb.none', priority: 'warning', title: 'no range for 5 s: check the tag', since_ms: 40e3, ...known },
   ]);
 });

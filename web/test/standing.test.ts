@@ -98,7 +98,7 @@ describe('what a device stands for', () => {
     expect(standing(device(was), recent(0))).toMatchObject({
       word: 'ELSEWHERE',
       tone: 'caution',
-      what: '0x6e02 speaks as device "new".',
+      what: '0x6e02 identifies itself as device "new".',
     });
     expect(standing(device({ conflict }), recent(300), false).word).toBe('WORKING');
     expect(standing(device(was), recent(0), false).word).toBe('UNPLUGGED');

@@ -14,9 +14,20 @@ import { along, building_bearing, extent, fit, intervals95, wind, type Fit } fro
 import { magnification, round_length } from './enu';
 import type { ElevationProps } from './elevation_props';
 import { elevation_shown } from './elevation_shown';
+import { by_priority } from './label_order';
 import { palette_of, read_palette, status_colour, trail_style, type Palette } from './palette';
 import type { Content } from './picture';
-import { anchor_symbol, beyond, drone, label, mirror_dots, reticle, type Box, type Ctx } from './symbols';
+import {
+  anchor_symbol,
+  beyond,
+  draw_labels,
+  drone,
+  mirror_dots,
+  place_label,
+  reticle,
+  type Box,
+  type Ctx,
+} from './symbols';
 
 /// Chosen by hand; null looks along the building.
 const turned = signal<number | null>(null);
@@ -248,28 +259,25 @@ function draw_elevation(
   }
   for (const { a, x, y } of at) anchor_symbol(c, p, a.status, x, y, r);
   aircraft(c, p, content, picture, s);
-  const first = at.filter(({ a }) => a.anchor === content.selected),
-    rest = at.filter(({ a }) => a.anchor !== content.selected),
+  const ordered = by_priority(
+      at.map(({ a }) => a),
+      content.selected,
+      content.flight?.target ?? null,
+    ),
     up = (u: number, v95_m: number | null = null): string =>
       `${fixed(u - (picture.ground_m ?? 0), 2)} m${v95_m === null ? '' : ` ${accuracy(v95_m)}`}`;
-  for (const { x, y } of first) reticle(c, p, x, y, r * 2.2);
-  for (const { a, x, y } of [...first, ...rest]) {
-    const on = a.anchor === content.selected;
-    label(c, p, x, y, on ? r * 2.2 + 8 : r + 6, a.anchor, up(a.enu_m![2], a.v95_m), taken, on);
-  }
-  for (const { a } of at)
-    if (a.mirror?.enu_m)
-      label(
-        c,
-        p,
-        s(a.mirror.enu_m),
-        picture.y(a.mirror.enu_m[2]),
-        r + 6,
-        'mirror',
-        up(a.mirror.enu_m[2]),
-        taken,
-        false,
-      );
+  const names = ordered.flatMap((a) => {
+    const on = a.anchor === content.selected,
+      [x, y] = [s(a.enu_m!), picture.y(a.enu_m![2])];
+    if (on) reticle(c, p, x, y, r * 2.2);
+    return place_label(c, p, x, y, on ? r * 2.2 + 8 : r + 6, a.anchor, up(a.enu_m![2], a.v95_m), taken, on);
+  });
+  const mirrors = ordered.flatMap((a) => {
+    if (!a.mirror?.enu_m) return [];
+    const [x, y] = [s(a.mirror.enu_m), picture.y(a.mirror.enu_m[2])];
+    return place_label(c, p, x, y, r + 6, 'mirror', up(a.mirror.enu_m[2]), taken, false);
+  });
+  draw_labels(c, p, [...names, ...mirrors]);
   return at.map(({ a, x, y }) => ({ id: a.anchor, x, y }));
 }
 

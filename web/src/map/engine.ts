@@ -9,6 +9,7 @@ import { magnification } from './enu';
 import { read_palette, type Palette } from './palette';
 import { next_picture } from '../state/pace';
 import { interpolated } from '../state/scene';
+import type { Box } from './symbols';
 import { draw_fast, draw_slow, draw_top, mark_trail, trail_stands, type Content, type TrailMark } from './picture';
 
 export type Mode = 'fit' | 'follow' | 'free';
@@ -30,6 +31,16 @@ export interface MapHooks {
 const ENU = new Projection({ code: 'anchord:enu', units: 'm', extent: [-2e5, -2e5, 2e5, 2e5] });
 const PLAN_NEAR_M = 300;
 const reduced = matchMedia('(prefers-reduced-motion: reduce)');
+
+/// Where buttons and scales lie over the map: no name is written under them.
+function covered(target: HTMLElement): Box[] {
+  const at = target.getBoundingClientRect(),
+    over = target.parentElement?.querySelectorAll(':scope > :is(.mapui, .scalebar, .levelchoice)') ?? [];
+  return [...over].map((e) => {
+    const r = e.getBoundingClientRect();
+    return { x: r.x - at.x, y: r.y - at.y, w: r.width, h: r.height };
+  });
+}
 
 export function open_map(
   target: HTMLElement,
@@ -84,7 +95,7 @@ export function open_map(
       if (c) draw_slow(c, palette, cam, content, magnified);
       trail_mark = mark_trail(content);
       const t = sized(top, cam);
-      if (t) draw_top(t, palette, cam, content);
+      if (t) draw_top(t, palette, cam, content, covered(target));
       hooks.camera_changed(cam.px_per_m, magnified);
       dirty = true;
       return slow;

@@ -5,9 +5,21 @@ import type { Backdrop } from '../state/floors';
 import { accuracy, age, percent } from '../ui/format';
 import { to_px, type Camera } from './camera';
 import { round_length } from './enu';
+import { by_priority } from './label_order';
 import { draw_flight, numbered, type FlightPicture } from './flight_layer';
 import { palette_of, range_colour, status_colour, trail_style, type Palette } from './palette';
-import { anchor_symbol, beyond, drone, ellipse_at, label, mirror_dots, reticle, type Box, type Ctx } from './symbols';
+import {
+  anchor_symbol,
+  beyond,
+  draw_labels,
+  drone,
+  ellipse_at,
+  mirror_dots,
+  place_label,
+  reticle,
+  type Box,
+  type Ctx,
+} from './symbols';
 
 export interface Content {
   readonly anchors: readonly EstimateMsg[];
@@ -66,13 +78,13 @@ export function draw_backdrop(c: Ctx, cam: Camera, b: Backdrop): void {
   c.drawImage(b.image, left, top, right - left, bottom - top);
   c.restore();
 }
-/// Symbols and labels, above the ranges: a line must never strike out a name.
-export function draw_top(c: Ctx, palette: Palette, cam: Camera, content: Content): void {
+/// Symbols and labels, above the ranges: a line must never strike out a name. `covered`: by buttons and scales over the map.
+export function draw_top(c: Ctx, palette: Palette, cam: Camera, content: Content, covered: readonly Box[] = []): void {
   const p = palette_of(palette, content.link_lost);
   c.clearRect(0, 0, cam.w, cam.h);
   const r = symbol_r(p),
     placed = content.anchors.filter((a) => a.enu_m),
-    taken: Box[] = beyond(cam.w, cam.h);
+    taken: Box[] = [...beyond(cam.w, cam.h), ...covered];
   const block = (m: Vec3): void => {
     const [x, y] = to_px(cam, m);
     taken.push({ x: x - r - 2, y: y - r - 2, w: 2 * r + 4, h: 2 * r + 4 });
@@ -83,38 +95,22 @@ export function draw_top(c: Ctx, palette: Palette, cam: Camera, content: Content
     if (a.mirror?.enu_m) block(a.mirror.enu_m);
   }
   for (const a of placed) anchor_symbol(c, p, a.status, ...to_px(cam, a.enu_m!), r);
-  const first = placed.filter((a) => a.anchor === content.selected),
-    rest = placed.filter((a) => a.anchor !== content.selected);
-  for (const a of first) reticle(c, p, ...to_px(cam, a.enu_m!), r * 2.2);
+  const ordered = by_priority(placed, content.selected, content.flight?.target ?? null);
+  for (const a of ordered.slice(0, 1))
+    if (a.anchor === content.selected) reticle(c, p, ...to_px(cam, a.enu_m!), r * 2.2);
   // The names of all before the mirror of any: what has no room waits for the selection or a closer look.
-  for (const a of [...first, ...rest]) {
-    const [x, y] = to_px(cam, a.enu_m!);
-    const gap = a.anchor === content.selected ? r * 2.2 + 8 : r + 6;
-    label(
-      c,
-      p,
-      x,
-      y,
-      gap,
-      a.anchor,
-      a.mirror && a.probability !== null ? `${percent(a.probability)} % here` : accuracy(a.h95_m),
-      taken,
-      a.anchor === content.selected,
-    );
-  }
-  for (const a of [...first, ...rest]) {
-    if (a.mirror?.enu_m)
-      label(
-        c,
-        p,
-        ...to_px(cam, a.mirror.enu_m),
-        r + 6,
-        'mirror',
-        a.mirror.probability === null ? a.anchor : `${percent(a.mirror.probability)} %`,
-        taken,
-        false,
-      );
-  }
+  const names = ordered.flatMap((a) => {
+    const [x, y] = to_px(cam, a.enu_m!),
+      gap = a.anchor === content.selected ? r * 2.2 + 8 : r + 6,
+      how = a.mirror && a.probability !== null ? `${percent(a.probability)} % here` : accuracy(a.h95_m);
+    return place_label(c, p, x, y, gap, a.anchor, how, taken, a.anchor === content.selected);
+  });
+  const mirrors = ordered.flatMap((a) => {
+    if (!a.mirror?.enu_m) return [];
+    const odds = a.mirror.probability === null ? a.anchor : `${percent(a.mirror.probability)} %`;
+    return place_label(c, p, ...to_px(cam, a.mirror.enu_m), r + 6, 'mirror', odds, taken, false);
+  });
+  draw_labels(c, p, [...names, ...mirrors]);
 }
 /// The mirror's ellipse is the same one, reflected in the line between the two.
 function mirrored(a: EstimateMsg): NonNullable<EstimateMsg['ellipse95']> {
@@ -213,7 +209,8 @@ export function draw_fast(c: Ctx, palette: Palette, cam: Camera, content: Conten
   c.beginPath();
   c.arc(...antenna, (3 * p.rem) / 16, 0, Math.PI * 2);
   c.fill();
-  if (stale && content.running) label(c, p, ...body, 18, `last known, ${age(now_ms - scene.pose!.at_ms)}`, '', []);
+  if (stale && content.running)
+    draw_labels(c, p, place_label(c, p, ...body, 18, `last known, ${age(now_ms - scene.pose!.at_ms)}`, '', [], true));
 }
 type Point = readonly [number, number];
 interface RangeLine {

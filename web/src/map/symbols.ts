@@ -242,9 +242,23 @@ export function free_place(
   }
   return null;
 }
+const APART_PX = 2;
+/// A label where it has room: of (x, y), in this box; `far`: with a line to it.
+export interface Label {
+  readonly x: number;
+  readonly y: number;
+  readonly head: string;
+  readonly sub: string;
+  readonly box: Box;
+  readonly far: boolean;
+}
+const fonts = (p: Palette) => {
+  const [h1, h2] = [p.rem * 0.8125, p.rem * 0.75];
+  return { h1, h2, heads: `600 ${h1}px ${p.font}`, subs: `500 ${h2}px ${p.font}` };
+};
 /// Two-line label beside (x, y) where there is room, else its first line alone, else none: a name over a name says neither. `always`: it is drawn
 /// whatever it covers. Adds itself to `taken`.
-export function label(
+export function place_label(
   c: Ctx,
   p: Palette,
   x: number,
@@ -253,29 +267,37 @@ export function label(
   head: string,
   sub: string,
   taken: Box[],
-  always = true,
-): void {
-  const [h1, h2] = [p.rem * 0.8125, p.rem * 0.75];
-  const heads = `600 ${h1}px ${p.font}`,
-    subs = `500 ${h2}px ${p.font}`;
-  c.save();
+  always: boolean,
+): Label[] {
+  const { h1, h2, heads, subs } = fonts(p);
   const w1 = width_of(c, heads, head),
     w2 = Math.max(w1, width_of(c, subs, sub)),
     whole = free_place(x, y, gap, w2, h1 + (sub ? h2 + 3 : 0), taken),
     found = whole ?? (sub ? free_place(x, y, gap, w1, h1, taken) : null);
-  if (!found && !always) return c.restore();
-  if (!whole && found) sub = '';
-  const box = found?.box ?? { x: x + gap, y: y - h1, w: w2, h: h1 + (sub ? h2 + 3 : 0) },
-    w = box.w;
-  taken.push(box);
-  if (found?.far) {
-    c.strokeStyle = p.ink3;
-    c.lineWidth = p.fine;
+  if (!found && !always) return [];
+  const box = found?.box ?? { x: x + gap, y: y - h1, w: w2, h: h1 + (sub ? h2 + 3 : 0) };
+  taken.push({ x: box.x - APART_PX, y: box.y - APART_PX, w: box.w + 2 * APART_PX, h: box.h + 2 * APART_PX });
+  return [{ x, y, head, sub: whole || !found ? sub : '', box, far: found?.far ?? false }];
+}
+/// All lines first: none of them strikes out a name.
+export function draw_labels(c: Ctx, p: Palette, labels: readonly Label[]): void {
+  c.save();
+  c.strokeStyle = p.ink3;
+  c.lineWidth = p.fine;
+  for (const { x, y, box, far } of labels) {
+    if (!far) continue;
     c.beginPath();
     c.moveTo(x, y);
-    c.lineTo(Math.max(box.x, Math.min(x, box.x + w)), Math.max(box.y, Math.min(y, box.y + box.h)));
+    c.lineTo(Math.max(box.x, Math.min(x, box.x + box.w)), Math.max(box.y, Math.min(y, box.y + box.h)));
     c.stroke();
   }
+  c.restore();
+  for (const l of labels) draw_text(c, p, l);
+}
+function draw_text(c: Ctx, p: Palette, { x, head, sub, box }: Label): void {
+  const { h1, h2, heads, subs } = fonts(p),
+    w = box.w;
+  c.save();
   c.textBaseline = 'top';
   c.lineJoin = 'round';
   c.strokeStyle = p.halo;

@@ -1,14 +1,9 @@
 /// The procedure and the alarms of a moment of a stored flight, from its events: each step is one, and each alarm that came or went. No DOM.
 import type { ProcedureMsg, Step } from '../live/flight_messages';
 import { STEPS } from '../live/flight_messages';
+import type { Alarm, Priority } from '../ui/alarm_rules';
 import type { Mark } from './recording';
 
-export interface MomentAlarm {
-  readonly id: string;
-  readonly level: string;
-  readonly text: string;
-  readonly since_us: number;
-}
 export interface Moment {
   readonly step: Step;
   readonly reason: string;
@@ -42,14 +37,22 @@ export function procedure_at(marks: readonly Mark[], t_us: number): Moment | nul
   return now;
 }
 
-/// Newest last. "alarm.raised" says "id: what is wrong", "alarm.cleared" "id is over".
-export function alarms_at(marks: readonly Mark[], t_us: number): MomentAlarm[] {
-  const standing = new Map<string, MomentAlarm>();
+const PRIORITY: Readonly<Record<string, Priority>> = { critical: 'critical', warning: 'warning' };
+/// Newest last, their `since_ms` by the clock of the flight. "alarm.raised" says "id: what is wrong", "alarm.cleared" "id is over".
+export function alarms_at(marks: readonly Mark[], t_us: number): Alarm[] {
+  const standing = new Map<string, Alarm>();
   for (const m of marks) {
     if (m.t_us > t_us) break;
     if (m.code === 'alarm.raised') {
       const [id = '', ...words] = m.text.split(': ');
-      standing.set(id, { id, level: m.level, text: words.join(': '), since_us: m.t_us });
+      standing.set(id, {
+        id,
+        priority: PRIORITY[m.level] ?? 'advisory',
+        title: words.join(': ') || id,
+        advice: '',
+        since_ms: m.t_us / 1000,
+        acknowledged: false,
+      });
     } else if (m.code === 'alarm.cleared') standing.delete(m.text.replace(/ is over$/, ''));
   }
   return [...standing.values()];

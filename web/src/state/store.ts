@@ -50,6 +50,9 @@ export const now_ms = (): number => performance.now();
 let source: LiveSource | null = null;
 export const live_source = (): LiveSource | null => source;
 export const server_now_us = (): number => source?.now_us() ?? Date.now() * 1000;
+/// Until when anything is known: with the link lost no clock of a flight counts on.
+export const known_until_us = (): number =>
+  server_now_us() - (link.value === 'lost' ? (source?.data_age_ms() ?? 0) * 1000 : 0);
 
 /// Newest recording first, then the newest of the others.
 export const ordered_missions = computed(() =>

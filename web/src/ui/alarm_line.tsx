@@ -4,13 +4,13 @@ import { useRef, useState } from 'preact/hooks';
 import { link, live_source, now_ms, tick } from '../state/store';
 import { by_urgency, type Alarm } from './alarm_rules';
 import { acknowledge, alarms, mute } from './alarms';
+import { AlarmRow, shape_of } from './alarm_row';
 import { age, clock } from './format';
 import { Mark } from './marks';
 import { useDialog } from './use_dialog';
 
 const UNREAD_MS = 500; ///< a tap that soon after the line has changed was meant for what stood there before
 
-const shape_of = (a: Alarm) => (a.priority === 'critical' ? 'bad' : a.priority === 'warning' ? 'caution' : 'info');
 const for_s = (a: Alarm): string => clock((now_ms() - a.since_ms) / 1000, true);
 
 function Retry() {
@@ -47,27 +47,19 @@ function Actions({ a }: { a: Alarm }) {
 
 /// All of them. While it is open every row keeps its place: a new one comes last, and what is over stays, said to be over.
 function AlarmList({ list, close }: { list: readonly Alarm[]; close: () => void }) {
-  const box = useDialog<HTMLDivElement>(true, close),
+  const box = useDialog<HTMLDivElement>(close, 'alarms'),
     rows = useRef(new Map<string, Alarm>()).current,
     standing = new Set(list.map((a) => a.id));
   for (const a of list) rows.set(a.id, a);
   return (
-    <div class="alarmlist" id="alarm-list" role="dialog" aria-label="All alarms" tabIndex={-1} ref={box}>
-      <ul>
+    <div class="alarmlist" id="alarm-list" {...box} aria-label="All alarms">
+      <ul class="alarmrows">
         {[...rows.values()].map((a) => {
           const over = !standing.has(a.id);
           return (
-            <li key={a.id} data-testid={`listed-${a.id}`}>
-              <Mark shape={over ? 'off' : shape_of(a)} tone={over ? 'off' : shape_of(a)} />
-              <div class="grow">
-                <h2>{a.title}</h2>
-                {a.advice && <p>{a.advice}</p>}
-                <p class="mut">
-                  {over ? 'over' : `${a.priority}, for ${for_s(a)}${a.acknowledged ? ', acknowledged' : ''}`}
-                </p>
-              </div>
+            <AlarmRow key={a.id} a={a} stood={for_s(a)} over={over}>
               {!over && <Actions a={a} />}
-            </li>
+            </AlarmRow>
           );
         })}
       </ul>

@@ -1,8 +1,9 @@
 /// Help: what is on the screen in words, and the keys. A chunk of its own.
+import { useState } from 'preact/hooks';
 import { help_open, keys_on, set_keys } from './help_state';
 import { Icon } from './marks';
 import { useLater } from './use_later';
-import { useDialog } from './use_dialog';
+import { help_of_dialog, useDialog } from './use_dialog';
 
 const KEYS: readonly [string, string][] = [
   ['1', 'Live'],
@@ -28,16 +29,23 @@ const KEYS: readonly [string, string][] = [
   ['Esc', 'close'],
 ];
 const load_guide = () => import('../views/guide/guide').then((m) => m.GuideSheet);
+/// The page for what is on the screen: of the newest dialog, of the part that has the focus, of what is opened within the view; else of the view.
+function page_on_screen(): string {
+  const part = document.activeElement?.closest<HTMLElement>('[data-help], [data-help-part]'),
+    opened = [...document.querySelectorAll<HTMLElement>('main [data-help]')].at(-1);
+  return help_of_dialog() ?? part?.dataset.help ?? part?.dataset.helpPart ?? opened?.dataset.help ?? location.hash;
+}
 /// What is on the screen, in words: the guide's page for it.
 function ScreenHelp({ close }: { close: () => void }) {
-  const { part: Sheet } = useLater(load_guide);
-  return Sheet ? <Sheet hash={location.hash} close={close} /> : null;
+  const { part: Sheet } = useLater(load_guide),
+    [page] = useState(page_on_screen);
+  return Sheet ? <Sheet page={page} close={close} /> : null;
 }
 
 export function HelpSheet() {
-  const box = useDialog<HTMLElement>(true, () => (help_open.value = false));
+  const box = useDialog<HTMLElement>(() => (help_open.value = false), 'help');
   return (
-    <section class="sheet" role="dialog" aria-labelledby="help-title" tabIndex={-1} ref={box} data-testid="help">
+    <section class="sheet" {...box} aria-labelledby="help-title" data-testid="help">
       <div class="hd">
         <h2 id="help-title">Help</h2>
         <button class="btn quiet small" aria-label="Close" onClick={() => (help_open.value = false)}>

@@ -15,7 +15,7 @@ export function SignInSheet() {
   useEffect(() => {
     if (signed_out) input.current?.focus();
   }, [signed_out]);
-  const box = useDialog<HTMLElement>(!signed_out, close_sign_in);
+  const box = useDialog<HTMLElement>(close_sign_in, 'access', !signed_out);
   const submit = async (e: Event): Promise<void> => {
     e.preventDefault();
     const token = input.current?.value.trim() ?? '';
@@ -43,7 +43,7 @@ export function SignInSheet() {
   };
   const who = me.value;
   return (
-    <section class="sheet" role="dialog" aria-labelledby="sign-in-title" tabIndex={-1} ref={box} data-testid="sign-in">
+    <section class="sheet" {...box} aria-labelledby="sign-in-title" data-testid="sign-in">
       <div class="hd">
         <h2 id="sign-in-title">
           {signed_out ? 'Signed out' : who?.auth === 'off' ? 'Open access' : (who?.name ?? 'User')}

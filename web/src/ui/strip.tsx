@@ -8,12 +8,13 @@ import {
   watched_mission,
   watched_scene,
   devices,
+  known_until_us,
   link,
   live_source,
   now_ms,
-  server_now_us,
   system,
   tick,
+  watched_lost,
 } from '../state/store';
 import { alarms, sound, toggle_sound } from './alarms';
 import { fix_word } from './alarm_rules';
@@ -42,21 +43,43 @@ function craft_words(craft: DroneMsg): string {
   return `${craft.autopilot || 'The autopilot'} in mode ${craft.mode}, ${where}${height}.`;
 }
 
-function read(): Record<'link' | 'rtk' | 'uwb' | 'drone' | 'rec' | 'alarms', Reading> {
+type Readings = Record<'link' | 'rtk' | 'uwb' | 'drone' | 'rec' | 'alarms', Reading>;
+/// With the link lost no tile but the link's own is of now: struck, with the age of what it shows.
+function last_known({ link, ...others }: Readings, old: string): Readings {
+  const struck = (r: Reading): Reading =>
+    r.word === 'unknown'
+      ? r
+      : {
+          ...r,
+          tone: 'off',
+          stale: true,
+          extra: old,
+          card: (
+            <>
+              <p>Last known, {old}.</p>
+              <div class="stale">{r.card}</div>
+            </>
+          ),
+        };
+  const { rtk, uwb, drone, rec, alarms } = others;
+  return { link, rtk: struck(rtk), uwb: struck(uwb), drone: struck(drone), rec: struck(rec), alarms: struck(alarms) };
+}
+
+function read(): Readings {
   tick.value;
   const now = now_ms(),
     replay = replayed.value,
     scene = watched_scene(),
     mission = watched_mission.value,
     running = mission?.state === 'recording',
-    lost = replay === null && link.value === 'lost';
+    lost = watched_lost();
   const silence = live_source()?.silence_ms() ?? Infinity,
     data_age = live_source()?.data_age_ms() ?? Infinity,
     arriving = silence < 2000;
   const link_look = { connecting: look('off'), live: look('ok'), late: look('caution'), lost: look('bad') }[link.value];
   const rtk = scene?.rtk ?? null,
     rtk_age = rtk ? now - rtk.at_ms : Infinity,
-    rtk_stale = !!rtk && (lost || rtk_age > 2000 || !running);
+    rtk_stale = !!rtk && (rtk_age > 2000 || !running);
   const r = rtk?.value,
     old = (r?.correction_age_s ?? 0) > 5;
   const rtk_look =
@@ -74,18 +97,18 @@ function read(): Record<'link' | 'rtk' | 'uwb' | 'drone' | 'rec' | 'alarms', Rea
   const all_seen = Math.max(rows.length, mission?.anchors_found ?? 0, scene?.anchors.size ?? 0),
     uwb_stale = all_seen > 0 && (lost || !running);
   const pose = scene?.pose ?? null,
-    pose_stale = !!pose && (lost || now - pose.at_ms > 1000 || !running);
+    pose_stale = !!pose && (now - pose.at_ms > 1000 || !running);
   const up = pose?.value.enu_m?.[2] ?? null;
   const rec_s =
-    mission?.started_us != null ? ((running ? server_now_us() : mission.t_us) - mission.started_us) / 1e6 : null;
+    mission?.started_us != null ? ((running ? known_until_us() : mission.t_us) - mission.started_us) / 1e6 : null;
   // A replayed flight carries old times, so its length is by measurement: newest row minus start.
   const flown_s = mission?.started_us != null && pose ? (pose.value.t_us - mission.started_us) / 1e6 : rec_s;
   const sys = system.value?.value,
     craft = scene?.procedure?.value.drone ?? null;
-  const aged = (ms: number): string => (running || lost ? `${age(ms)} old` : 'ended');
+  const aged = (ms: number): string => (running ? `${age(ms)} old` : 'ended');
   const list = alarms.value,
     worst = list[0]?.priority;
-  return {
+  const readings: Readings = {
     link: replay
       ? {
           ...look('info'),
@@ -172,16 +195,9 @@ function read(): Record<'link' | 'rtk' | 'uwb' | 'drone' | 'rec' | 'alarms', Rea
     },
     drone: craft
       ? {
-          ...(lost
-            ? look('off')
-            : !craft.connected
-              ? look('bad')
-              : craft.failsafe || craft.taken_over
-                ? look('caution')
-                : look('ok')),
-          stale: lost,
+          ...(!craft.connected ? look('bad') : craft.failsafe || craft.taken_over ? look('caution') : look('ok')),
           word: craft.battery === null ? craft.mode || 'seen' : `${fixed(craft.battery * 100, 0)} %`,
-          extra: lost ? 'not known' : !craft.connected ? 'silent' : craft.battery === null ? '' : craft.mode,
+          extra: !craft.connected ? 'silent' : craft.battery === null ? '' : craft.mode,
           card: (
             <>
               <p>
@@ -189,7 +205,7 @@ function read(): Record<'link' | 'rtk' | 'uwb' | 'drone' | 'rec' | 'alarms', Rea
                   ? craft_words(craft)
                   : 'Nothing has been received from the aircraft for 3 s. It follows its own failsafe; use the remote control.'}
               </p>
-              {craft.text && <p>It says: {craft.text}</p>}
+              {craft.text && <p>The autopilot reports: {craft.text}</p>}
             </>
           ),
         }
@@ -213,9 +229,8 @@ function read(): Record<'link' | 'rtk' | 'uwb' | 'drone' | 'rec' | 'alarms', Rea
         },
     rec: {
       ...(replay ? look('off') : running ? (sys && !sys.recording ? look('caution') : look('ok')) : look('off')),
-      stale: lost && running,
       word: replay ? 'stored' : running ? clock(flown_s) : 'off',
-      extra: replay ? '' : lost && running ? 'not known' : running || !mission ? '' : mission.state,
+      extra: replay || running || !mission ? '' : mission.state,
       card: (
         <>
           <p>
@@ -236,9 +251,8 @@ function read(): Record<'link' | 'rtk' | 'uwb' | 'drone' | 'rec' | 'alarms', Rea
     },
     alarms: {
       ...(worst === 'critical' ? look('bad') : worst === 'warning' ? look('caution') : look('off')),
-      stale: lost && list.length > 0,
       word: list.length ? String(list.length) : lost ? 'unknown' : 'none',
-      extra: lost && list.length ? 'last known' : '',
+      extra: '',
       card: list.length ? (
         <ul>
           {list.map((a) => (
@@ -253,6 +267,7 @@ function read(): Record<'link' | 'rtk' | 'uwb' | 'drone' | 'rec' | 'alarms', Rea
       ),
     },
   };
+  return lost ? last_known(readings, `${age(data_age)} old`) : readings;
 }
 
 const LABELS = { link: 'Link', rtk: 'RTK', uwb: 'UWB', drone: 'Drone', rec: 'Recording', alarms: 'Alarms' } as const;
@@ -261,9 +276,9 @@ function Card({ label, word, children }: { label: string; word: string; children
   const close = (): void => {
       open_card.value = null;
     },
-    box = useDialog<HTMLDivElement>(true, close);
+    box = useDialog<HTMLDivElement>(close, 'strip');
   return (
-    <div class="card" role="dialog" aria-label={label} tabIndex={-1} ref={box}>
+    <div class="card" {...box} aria-label={label}>
       <h2>
         {label}: {word}
       </h2>
@@ -293,7 +308,7 @@ export function Strip() {
       </a>
       <div class="site">
         <b title={mission?.name ?? ''}>{mission?.name || 'No flight'}</b>
-        <span class={!replay && link.value === 'lost' && mission?.state === 'recording' ? 'stale' : ''}>
+        <span class={watched_lost() ? 'stale' : ''}>
           {replay
             ? 'replay'
             : mission

@@ -41,7 +41,7 @@ export function AnchorCard({ anchor }: { anchor: string }) {
       </div>
       {why && (
         <div
-          class={`callout ${e.status === 'ambiguous' || e.status === 'gave_up' ? 'caution' : e.status === 'moved' ? 'bad' : 'info'}`}
+          class={`callout says ${e.status === 'ambiguous' || e.status === 'gave_up' ? 'caution' : e.status === 'moved' ? 'bad' : 'info'}`}
         >
           <b>{why.title}</b>
           <p>{why.text}</p>

@@ -4,6 +4,7 @@ import { useEffect, useRef, useState } from 'preact/hooks';
 import type { AnchorRow } from '../api/anchors';
 import { sigma_h, sigma_v } from '../map/enu';
 import { accuracy, bearing, date, dms, fixed, latlon, metres } from '../ui/format';
+import { useDialog } from '../ui/use_dialog';
 
 export interface Column {
   readonly key: string;
@@ -178,6 +179,7 @@ export function choose(part: Partial<Choice>): void {
 export function ColumnPicker({ live }: { live: boolean }) {
   const [open, set_open] = useState(false),
     box = useRef<HTMLDivElement>(null),
+    list = useDialog<HTMLDivElement>(() => set_open(false), 'anchors', open),
     keys = live ? choice.value.live : choice.value.published,
     name = live ? 'live' : 'published';
   useEffect(() => {
@@ -185,18 +187,8 @@ export function ColumnPicker({ live }: { live: boolean }) {
     const away = (e: Event): void => {
       if (!(e.target instanceof Node && box.current?.contains(e.target))) set_open(false);
     };
-    const key = (e: KeyboardEvent): void => {
-      if (e.key === 'Escape') {
-        set_open(false);
-        box.current?.querySelector('button')?.focus();
-      }
-    };
     document.addEventListener('pointerdown', away);
-    document.addEventListener('keydown', key);
-    return () => {
-      document.removeEventListener('pointerdown', away);
-      document.removeEventListener('keydown', key);
-    };
+    return () => document.removeEventListener('pointerdown', away);
   }, [open]);
   const toggle = (key: string): void =>
     choose({ [name]: ALL.map((c) => c.key).filter((k) => (k === key ? !keys.includes(k) : keys.includes(k))) });
@@ -206,7 +198,7 @@ export function ColumnPicker({ live }: { live: boolean }) {
         Columns
       </button>
       {open && (
-        <div class="pop" role="group" aria-label="Columns of the table" data-testid="column-list">
+        <div class="pop" {...list} aria-label="Columns of the table" data-testid="column-list">
           {ALL.filter((c) => !live || !PUBLISHED_ONLY.has(c.key)).map((c) => (
             <label key={c.key}>
               <input

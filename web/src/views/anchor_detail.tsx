@@ -27,7 +27,7 @@ function ErrorBudget({ budget }: { budget: Budget }) {
           </div>
         ))}
       </dl>
-      <p class="mut">What would help most: {budget.help}.</p>
+      <p class="mut says">What would help most: {budget.help}.</p>
     </section>
   );
 }
@@ -60,7 +60,7 @@ export function AnchorDetail({
         </div>
         {why && (
           <div
-            class={`callout ${r.status === 'ambiguous' || r.status === 'gave_up' ? 'caution' : r.status === 'moved' ? 'bad' : 'info'}`}
+            class={`callout says ${r.status === 'ambiguous' || r.status === 'gave_up' ? 'caution' : r.status === 'moved' ? 'bad' : 'info'}`}
             data-testid="why"
           >
             <b>{why.title}</b>
@@ -144,7 +144,7 @@ export function AnchorDetail({
             <>
               <h3>
                 95 % ellipse{' '}
-                <span class="mut">
+                <span class="mut says">
                   {fixed(r.ellipse95.major_m, 3)} × {fixed(r.ellipse95.minor_m, 3)} m @{' '}
                   {bearing(r.ellipse95.azimuth_deg)}°
                 </span>
@@ -229,7 +229,7 @@ const Degrees = ({ v, axis }: { v: number | null; axis: 'lat' | 'lon' }) =>
 function Twin({ r }: { r: AnchorRow }) {
   const m = r.mirror!;
   return (
-    <p class="why" data-testid="mirror">
+    <p class="why says" data-testid="mirror">
       <Mark shape="half" tone="caution" /> Mirror solution
       {m.probability === null ? '' : `, ${percent(m.probability)} %`}:{' '}
       <span class="n">
@@ -253,7 +253,7 @@ function Gates({ r }: { r: AnchorRow }) {
         <table class="gates" data-testid="gates">
           <caption>
             Acceptance gates{' '}
-            <span class="mut">
+            <span class="mut says">
               {passed} of {r.gates.length} pass
             </span>
           </caption>

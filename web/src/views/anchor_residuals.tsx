@@ -68,7 +68,7 @@ export function AnchorResiduals({ row, mission }: { row: AnchorRow; mission: str
             <Scatter rows={got.rows} x={(r) => r.bearing_deg} label="bearing" unit="°" span={[0, 360]} />
           </div>
           <p class="sub">
-            Measured minus explained, mm. Full dots: used, the larger the more weight; crosses: rejected, at the edge
+            Measured minus computed, mm. Full dots: used, the larger the more weight; crosses: rejected, at the edge
             where they are beyond it. A slope over distance is a scale or bias; one side of the compass high is a wall
             there.
           </p>
@@ -178,9 +178,9 @@ function Doubtful({ rows, name }: { rows: readonly Residual[]; name: string }) {
   const first = Math.min(...rows.map((r) => r.t_us)),
     worst = by_suspicion(rows).slice(0, 8);
   return (
-    <div class="scrollx" tabIndex={0} role="region" aria-label={`Ranges to doubt of ${name}`}>
+    <div class="scrollx" tabIndex={0} role="region" aria-label={`Ranges to check of ${name}`}>
       <table class="reads doubt" data-testid="doubtful">
-        <caption>Ranges to doubt first</caption>
+        <caption>Ranges to check first</caption>
         <thead>
           <tr>
             <th scope="col">At</th>

@@ -8,8 +8,18 @@ import type { FlightPicture } from '../map/flight_layer';
 import { MapBox } from '../map/map_box';
 import { done_count, shown_estimates } from '../state/done';
 import { backdrops } from '../state/floors';
-import { me, may_publish } from '../state/session';
-import { chosen_anchor, current_mission, current_scene, link, revision, synced, tick, when_back } from '../state/store';
+import { may, me, may_publish } from '../state/session';
+import {
+  chosen_anchor,
+  current_mission,
+  current_scene,
+  link,
+  revision,
+  synced,
+  tick,
+  watched_lost,
+  when_back,
+} from '../state/store';
 import type { MissionMsg } from '../live/messages';
 import { Empty, not_loaded_words } from '../ui/empty';
 import { Icon } from '../ui/marks';
@@ -232,7 +242,7 @@ export function Anchors({ anchor }: { anchor: string | null }) {
           anchors: on_map,
           selected: selected?.anchor ?? null,
           scene: live ? current_scene() : null,
-          link_lost: link.peek() === 'lost',
+          link_lost: watched_lost(),
           running: mission?.state === 'recording',
           flight: live ? building() : null,
           backdrops: backdrops(live ? mission?.origin : origin_of(rows)),
@@ -278,17 +288,27 @@ function Nothing({ live, filtered }: { live: boolean; filtered: boolean }) {
     return (
       <div class="empty small">
         <Empty cls="" loaded={synced.value && link.value !== 'lost'}>
-          No anchor has been in range in this flight.
+          {current_mission.value
+            ? 'No anchor has been in range in this flight. Is the tag powered, and are anchors in reach? Live shows what arrives.'
+            : 'No flight yet, so no anchor has a position. Fly the first one, or import one.'}
         </Empty>
-        <a class="btn" href="#/live">
-          Go to Live
-        </a>
+        <span class="ways">
+          <a class="btn" href="#/live">
+            Go to Live
+          </a>
+          {!current_mission.value && may('operator') && (
+            <a class="btn" href="#/import">
+              Import a flight
+            </a>
+          )}
+        </span>
       </div>
     );
   return (
     <div class="empty small">
       <Empty cls="" loaded={loaded.value !== null} failed={problem.value !== null}>
-        Nothing is published yet. Facility tools see an empty list until a calibration is published.
+        Nothing is published yet, and facility tools see an empty list. After a flight, Review and publish makes the
+        first revision.
       </Empty>
       <button class="btn" onClick={() => (source.value = 'live')}>
         Show live estimates

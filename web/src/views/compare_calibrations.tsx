@@ -23,7 +23,7 @@ export function CompareCalibrations() {
     [against, set_against] = useState('published'),
     [rows, set_rows] = useState<readonly Shift[] | null>(null),
     [problem, set_problem] = useState(''),
-    box = useDialog<HTMLElement>(true, () => (compare_open.value = false));
+    box = useDialog<HTMLElement>(() => (compare_open.value = false), 'compare');
   useLoad(() => {
     if (list) return;
     solves().then(
@@ -61,15 +61,7 @@ export function CompareCalibrations() {
     both = rows?.filter((r) => r.delta_m !== null) ?? [],
     alike = common_shift(both);
   return (
-    <section
-      class="drawer"
-      role="dialog"
-      aria-modal="false"
-      aria-labelledby="compare-title"
-      tabIndex={-1}
-      ref={box}
-      data-testid="compare-calibrations"
-    >
+    <section class="drawer" {...box} aria-labelledby="compare-title" data-testid="compare-calibrations">
       <div class="hd big">
         <h2 id="compare-title">Compare two calibrations</h2>
         <span class="grow" />
@@ -79,7 +71,7 @@ export function CompareCalibrations() {
       </div>
       {!list && <NotLoaded failed={problem !== ''} />}
       {list?.length === 0 ? (
-        <p class="why">Nothing was solved yet: Review and publish makes the first calibration.</p>
+        <p class="why">No flight is calibrated yet: Review and publish makes the first calibration.</p>
       ) : (
         list && (
           <div class="comparing">

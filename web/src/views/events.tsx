@@ -1,12 +1,36 @@
+import type { ComponentChildren } from 'preact';
 import { events, server_now_us, tick } from '../state/store';
 import { age } from '../ui/format';
 import { Mark, type Tone } from '../ui/marks';
 
-const TONE: Record<'info' | 'warning' | 'critical', Tone & ('info' | 'caution' | 'bad')> = {
+const TONE: Readonly<Record<string, Tone & ('info' | 'caution' | 'bad')>> = {
   info: 'info',
   warning: 'caution',
   critical: 'bad',
 };
+
+/// One event of a list: live, with its age; of a stored flight, with the way to its moment.
+export function EventRow({
+  e,
+  here = false,
+  children,
+}: {
+  e: { readonly level: string; readonly text: string; readonly code: string };
+  here?: boolean; ///< the last one before the moment that is shown
+  children: ComponentChildren;
+}) {
+  const look = TONE[e.level] ?? 'info';
+  return (
+    <li aria-current={here ? 'step' : undefined}>
+      <Mark shape={look} tone={look} />
+      <span>
+        <span class="sr">{e.level}: </span>
+        {e.text || e.code}
+      </span>
+      {children}
+    </li>
+  );
+}
 
 /// The last 50 events, newest first; closed by default, since alarms say what needs doing.
 export function Events() {
@@ -23,14 +47,9 @@ export function Events() {
       </summary>
       <ul>
         {list.map((e) => (
-          <li key={e.id}>
-            <Mark shape={TONE[e.level]} tone={TONE[e.level]} />
-            <span>
-              <span class="sr">{e.level}: </span>
-              {e.text || e.code}
-            </span>
+          <EventRow key={e.id} e={e}>
             <span class="mut">{age((server_now_us() - e.t_us) / 1000)}</span>
-          </li>
+          </EventRow>
         ))}
       </ul>
     </details>

@@ -10,13 +10,14 @@ import {
   chosen_mission,
   current_mission,
   current_scene,
+  known_until_us,
   link,
   mission_id,
   now_ms,
   ordered_missions,
-  server_now_us,
   synced,
   tick,
+  watched_lost,
 } from '../state/store';
 import { not_loaded_words } from '../ui/empty';
 import { bearing, clock, fixed, grouped, millimetres, told_apart } from '../ui/format';
@@ -28,7 +29,7 @@ import './flight/field.css';
 import './flight/flight.css';
 import { FlightBar } from './flight/commands';
 import { flight_picture, follow_plan } from './flight/picture';
-import { Clues, NextPoint, Procedure } from './flight/procedure';
+import { TurnAndHeight, NextPoint, Procedure } from './flight/procedure';
 import { RangeList } from './range_list';
 
 export function content(): Content {
@@ -38,7 +39,7 @@ export function content(): Content {
     anchors: shown_estimates(scene),
     selected: chosen_anchor.peek(),
     scene,
-    link_lost: link.peek() === 'lost',
+    link_lost: watched_lost(),
     running: m?.state === 'recording',
     flight: flight_picture(),
     backdrops: backdrops(m?.origin),
@@ -78,7 +79,7 @@ export function Live() {
       <aside class="side" aria-label="Flight, ranges, selected anchor" tabIndex={0}>
         <Procedure />
         <NextPoint />
-        <Clues />
+        <TurnAndHeight />
         <Progress />
         <RangeList selected={selected} />
         {selected && <AnchorCard anchor={selected} />}
@@ -119,7 +120,7 @@ function Progress() {
   const s =
     m.started_us === null
       ? null
-      : ((scene?.pose?.value.t_us ?? (running ? server_now_us() : m.t_us)) - m.started_us) / 1e6;
+      : ((scene?.pose?.value.t_us ?? (running ? known_until_us() : m.t_us)) - m.started_us) / 1e6;
   const stale = lost || now_ms() - (scene?.state_at_ms ?? 0) > 5000;
   const cls = stale && running ? 'stale' : '';
   return (

@@ -53,7 +53,7 @@ export function Publish({ mission }: { mission: MissionMsg }) {
   const keys = useRef({ calibrate: idempotency_key(), publish: idempotency_key() }),
     [form, change, forget] = useDraft<Form>(`publish/${mission.mission}`, { note: '', reasons: {}, left: {} }),
     { note, reasons, left } = form,
-    box = useDialog<HTMLElement>(true, () => (publish_open.value = false));
+    box = useDialog<HTMLElement>(() => (publish_open.value = false), 'landed');
   const guarded = async (what: 'calibrating' | 'publishing' | 'planning', work: () => Promise<void>): Promise<void> => {
     set_busy(what);
     set_problem('');
@@ -126,15 +126,7 @@ export function Publish({ mission }: { mission: MissionMsg }) {
       location.hash = '#/plan';
     });
   return (
-    <section
-      class={reviewed ? 'drawer wide' : 'drawer'}
-      role="dialog"
-      aria-modal="false"
-      aria-labelledby="publish-title"
-      tabIndex={-1}
-      ref={box}
-      data-testid="publish"
-    >
+    <section class={reviewed ? 'drawer wide' : 'drawer'} {...box} aria-labelledby="publish-title" data-testid="publish">
       <div class="hd big">
         <h2 id="publish-title">Review and publish</h2>
         <span class="grow" />

@@ -55,7 +55,7 @@ export function RangeList({ selected }: { selected: string | null }) {
     <section class="sec-p ranges" data-testid="range-list">
       <div class="hd">
         <h2>Ranges</h2>
-        <span class="meta">
+        <span class={lost ? 'meta now' : 'meta'}>
           {!rows.length
             ? ''
             : lost

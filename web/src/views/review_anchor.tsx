@@ -2,6 +2,7 @@
 import type { AnchorRow } from '../api/anchors';
 import { MapBox } from '../map/map_box';
 import { likelier } from '../state/done';
+import { watched_lost } from '../state/store';
 import { AnchorDetail } from './anchor_detail';
 
 const nothing = (): void => undefined;
@@ -22,7 +23,7 @@ export function ReviewAnchor({
           anchors: rows.map(likelier),
           selected: row.anchor,
           scene: null,
-          link_lost: false,
+          link_lost: watched_lost(),
           running: false,
         })}
         onSelect={pick}

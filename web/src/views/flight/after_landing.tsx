@@ -30,7 +30,10 @@ export function AfterLanding({ mission }: { mission: string }) {
     <div class={there ? 'callout info' : 'callout'} role="status" data-testid="after-landing">
       {there ? (
         <>
-          <b>The flight is calibrated.</b> {good} of {n} anchors have a position; nothing is published yet.{' '}
+          <b>The flight is calibrated.</b>{' '}
+          <span class="says">
+            {good} of {n} anchors have a position; nothing is published yet.
+          </span>{' '}
           {may_publish.value && (
             <button
               class="btn small primary"

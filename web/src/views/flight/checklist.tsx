@@ -26,7 +26,7 @@ export function Checklist({
     [manual, set_manual] = useState(false),
     [problem, set_problem] = useState(''),
     named_plan = useRef<string | null>(null), // which plan the server knows is to be flown
-    box = useDialog<HTMLElement>(true, () => (checklist_open.value = false));
+    box = useDialog<HTMLElement>(() => (checklist_open.value = false), 'preflight');
   useEffect(() => {
     refused.value = ''; // of another command
   }, []);
@@ -63,14 +63,7 @@ export function Checklist({
     set_item(mission, item.id, reason).then(look, (e: unknown) => set_problem(error_text(e)));
   };
   return (
-    <section
-      class="drawer"
-      role="dialog"
-      aria-labelledby="checklist-title"
-      tabIndex={-1}
-      ref={box}
-      data-testid="checklist"
-    >
+    <section class="drawer" {...box} aria-labelledby="checklist-title" data-testid="checklist">
       <div class="hd big">
         <h2 id="checklist-title">Before take-off</h2>
         <span class="grow" />

@@ -30,7 +30,7 @@ async function look(p: ProcedureMsg, undo: boolean): Promise<Shown> {
 export function PlanChange({ p, undo, close }: { p: ProcedureMsg; undo: boolean; close: () => void }) {
   const [shown, set_shown] = useState<Shown | null>(null),
     [failed, set_failed] = useState(''),
-    box = useDialog<HTMLElement>(true, close),
+    box = useDialog<HTMLElement>(close, 'plan-change'),
     { mission, waypoint, step, plan_saved_revision, plan_revision } = p,
     mine = lease.value?.mission === mission;
   const ask = useStable(() => look(p, undo));
@@ -61,14 +61,7 @@ export function PlanChange({ p, undo, close }: { p: ProcedureMsg; undo: boolean;
     close();
   };
   return (
-    <section
-      class="callout planchange"
-      role="dialog"
-      aria-label="Change of plan in flight"
-      data-testid="plan-change"
-      tabIndex={-1}
-      ref={box}
-    >
+    <section class="callout planchange" {...box} aria-label="Change of plan in flight" data-testid="plan-change">
       <h2>{undo ? 'Undo the change of plan' : 'Change of plan in flight'}</h2>
       {failed && (
         <p class="problem" role="alert">

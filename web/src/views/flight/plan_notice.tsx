@@ -19,7 +19,7 @@ export function PlanNotice({ p }: { p: ProcedureMsg }) {
     <>
       {waits && open !== 'saved' && (
         <p class="callout" role="status" data-testid="plan-waits">
-          <b>
+          <b class="says">
             Revision {p.plan_saved_revision} of {p.plan_name} is saved, revision {p.plan_revision} is flown.
           </b>{' '}
           <button class="btn small" data-testid="plan-review" onClick={() => (shown_change.value = 'saved')}>

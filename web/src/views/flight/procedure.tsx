@@ -40,7 +40,9 @@ export function Procedure() {
       <div class="hd">
         <h2>Procedure</h2>
         {stale && flying(p) ? (
-          <Chip shape="off" tone="off" word="LAST KNOWN" />
+          <span class="now">
+            <Chip shape="off" tone="off" word="LAST KNOWN" />
+          </span>
         ) : (
           <Chip shape={shape} tone={tone} word={word} />
         )}
@@ -56,7 +58,7 @@ export function Procedure() {
           <>
             <Mark shape="off" tone="off" />
             <span>{STEP_WORDS[next]}</span>
-            <span class="t">
+            <span class="t says">
               {p.step_limit_s !== null && since !== null && p.step_limit_s > since
                 ? `within ${fixed(p.step_limit_s - since, 0)} s`
                 : ''}
@@ -69,10 +71,10 @@ export function Procedure() {
           <b>The flight ended before its plan was flown.</b> {sentence(p.ended || p.reason)}
         </div>
       ) : (
-        p.reason && <p class="why">{sentence(p.reason)}</p>
+        p.reason && <p class="why says">{sentence(p.reason)}</p>
       )}
       {(p.status === 'done' || p.status === 'aborted') && <AfterLanding mission={p.mission} />}
-      {p.ended && flying(p) && p.ended !== p.reason && <p class="why">Why it comes home: {p.ended}.</p>}
+      {p.ended && flying(p) && p.ended !== p.reason && <p class="why says">Why it returns: {p.ended}.</p>}
       {p.drone?.taken_over && (
         <div class="callout caution">
           <b>The pilot has taken over by remote control.</b> No target is sent until the flight is started or resumed
@@ -80,7 +82,7 @@ export function Procedure() {
         </div>
       )}
       {p.mode === 'manual' && p.target && flying(p) && (
-        <div class="callout">
+        <div class="callout says">
           <b>
             Fly by hand: {fixed(p.distance_m, 1)} m to go
             {p.target.height_m === null ? '' : `, to ${fixed(p.target.height_m, 1)} m above ground`}
@@ -139,7 +141,7 @@ function NotDone({ p }: { p: ProcedureMsg }) {
   const open = p.anchors.filter((a) => !a.done && a.why);
   if (!open.length) return null;
   return (
-    <details class="notdone">
+    <details class="notdone says">
       <summary>
         {open.length} of {p.anchors.length} anchors not done
       </summary>
@@ -149,7 +151,10 @@ function NotDone({ p }: { p: ProcedureMsg }) {
             <b>{a.anchor}</b> {a.why}
             {a.at_edge && <span class="sub"> Its height lies at an end of the height search, perhaps beyond.</span>}
             {a.no_lobe && (
-              <span class="sub"> The turn saw no lobe of it from this far: no height search until it is nearer.</span>
+              <span class="sub">
+                {' '}
+                The turn showed no direction to it from this distance: no height search until it is nearer.
+              </span>
             )}
           </li>
         ))}
@@ -171,7 +176,7 @@ export function NextPoint() {
   return (
     <section class="sec-p" data-testid="next-point">
       <div class="hd">
-        <h2>Next point, P{g.iteration + 1}</h2>
+        <h2 class="says">Next point, P{g.iteration + 1}</h2>
         <Chip shape={outcome.shape} tone={outcome.tone} word={outcome.word} />
       </div>
       <dl class="kv np2">
@@ -192,11 +197,11 @@ export function NextPoint() {
           </div>
         )}
       </dl>
-      {outcome.why && <p class="why">{sentence(outcome.why)}</p>}
-      {g.reason && <p class="why">{sentence(g.reason)}</p>}
+      {outcome.why && <p class="why says">{sentence(outcome.why)}</p>}
+      {g.reason && <p class="why says">{sentence(g.reason)}</p>}
       <Ramp g={g} />
       <details class="candidates">
-        <summary>{g.candidates.length} candidates</summary>
+        <summary class="says">{g.candidates.length} candidates</summary>
         <table class="tbl">
           <caption class="sr">Candidates of the last decision, best first</caption>
           <thead>
@@ -234,7 +239,7 @@ function Ramp({ g }: { g: GridMsg }) {
   const values = g.candidates.flatMap((c) => (c.value === null || c.refused ? [] : [c.value]));
   if (values.length < 2) return null;
   return (
-    <div class="ramp">
+    <div class="ramp says">
       <span>{value_words(g, Math.min(...values))} lowest</span>
       <span class="sw" aria-hidden="true">
         {[0, 1, 2, 3, 4, 5].map((i) => (
@@ -246,7 +251,7 @@ function Ramp({ g }: { g: GridMsg }) {
   );
 }
 
-export function Clues() {
+export function TurnAndHeight() {
   tick.value;
   const scene = current_scene(),
     step = scene?.procedure?.value.step;

@@ -3,13 +3,14 @@ import { useEffect } from 'preact/hooks';
 import './guide.css';
 import { page_for, page_of, PAGES, type Block, type Page } from './pages';
 
-export const Blocks = ({ blocks }: { blocks: readonly Block[] }) => (
+/// `Heading`: one below that of the page.
+const Blocks = ({ blocks, Heading }: { blocks: readonly Block[]; Heading: 'h2' | 'h4' }) => (
   <>
     {blocks.map((b, i) =>
       'p' in b ? (
         <p key={i}>{b.p}</p>
       ) : 'h' in b ? (
-        <h3 key={i}>{b.h}</h3>
+        <Heading key={i}>{b.h}</Heading>
       ) : 'steps' in b ? (
         <ol key={i}>
           {b.steps.map((s) => (
@@ -77,19 +78,19 @@ export function Guide({ page: id }: { page: string | null }) {
       </nav>
       <article class="guidepage" tabIndex={0} aria-label={page.title}>
         <h1>{page.title}</h1>
-        <Blocks blocks={page.blocks} />
+        <Blocks blocks={page.blocks} Heading="h2" />
       </article>
     </div>
   );
 }
 
-/// In the help sheet: the page for what is on the screen.
-export function GuideSheet({ hash, close }: { hash: string; close: () => void }) {
-  const page: Page = page_of(page_for(hash));
+/// In the help sheet: the page for what is on the screen, by its name or by the address of a view.
+export function GuideSheet({ page: named, close }: { page: string; close: () => void }) {
+  const page: Page = page_of(page_for(named));
   return (
     <div class="guidepage insheet" data-testid="help-page">
       <h3>{page.title}</h3>
-      <Blocks blocks={page.blocks} />
+      <Blocks blocks={page.blocks} Heading="h4" />
       <p>
         <a class="btn small" href={`#/guide/${page.id}`} onClick={close}>
           All pages of the guide

@@ -14,13 +14,46 @@ export interface Page {
 
 export const PAGES: readonly Page[] = [
   {
+    id: 'first',
+    title: 'The first flight',
+    group: 'Set up',
+    blocks: [
+      { p: 'There are three ways to it; none needs the internet.' },
+      {
+        list: [
+          'Fly the demonstration: the server simulates a drone and six anchors. Positions come within a minute.',
+          'Connect my devices: the tag, the receiver and the corrections, step by step, each checked while it measures.',
+          'Import a flight: a folder, tables or a .zip of a flight that was flown already.',
+        ],
+      },
+    ],
+  },
+  {
+    id: 'connect',
+    title: 'Connect the devices',
+    group: 'Set up',
+    blocks: [
+      {
+        steps: [
+          'Plug in the UWB tag and the RTK receiver. System, Devices: Discover lists what is found at the ports.',
+          'Add what was found. What is not found by itself is added by hand: kind, port or address.',
+          'Choose a name under by-id for a serial port: it stays when the plug moves.',
+          'Add the source of corrections (NTRIP), where the receiver does not have its own.',
+          'Wait for LIVE. LATE and LOST name their reason: power, cable, port, settings.',
+          'Compare the radio of the tag with that of the anchors in range.',
+        ],
+      },
+      { p: 'A change opens the link of the device anew; rows of that moment are missing from the flight.' },
+    ],
+  },
+  {
     id: 'mounting',
     title: 'Mount the tag and the receiver',
     group: 'Set up',
     blocks: [
       {
         p:
-          'The UWB tag measures distances, the RTK receiver says where it is. Both are fixed to the aircraft so that neither moves ' +
+          'The UWB tag measures distances, the RTK receiver its own position. Both are fixed to the aircraft so that neither moves ' +
           'against the other.',
       },
       {
@@ -50,7 +83,7 @@ export const PAGES: readonly Page[] = [
           'Put the aircraft level. Forward is where its nose points.',
           "Measure from the middle of the GNSS antenna's phase centre (its label gives the height above the mount) to the middle of the tag's antenna.",
           'Forward and left are positive; below the antenna is negative. Example: 12 cm ahead, 28 cm below is 0.12, 0, −0.28.',
-          'Type it in System, Lever arms. It is kept with each flight.',
+          'Give it with the flight: in flight.json, on the page of the import, or as tags of POST /missions. System, Lever arms shows what a flight has.',
         ],
       },
       { h: 'Check' },
@@ -126,6 +159,38 @@ export const PAGES: readonly Page[] = [
     ],
   },
   {
+    id: 'import',
+    title: 'Import a flight',
+    group: 'Set up',
+    blocks: [
+      {
+        steps: [
+          'Drop the folder of the flight (flight.json, track.csv, ranges.csv), its two tables, or either as .zip.',
+          'Say what each column is where its name does not: time, position, distance, address of the anchor.',
+          'Say which point the track is of, and where the antenna of the tag is from there: forward, left, up.',
+          'Import: its rows are stored, its anchors are estimated and shown in Anchors.',
+        ],
+      },
+      { p: 'Rows that are rejected are counted, with the first reason.' },
+    ],
+  },
+  {
+    id: 'floor-plan',
+    title: 'Floor plans',
+    group: 'Set up',
+    blocks: [
+      { p: 'A floor plan lies under the maps, and its traced walls count where the next point is chosen.' },
+      {
+        steps: [
+          'Plan, Floor plan: choose the floor, or make one.',
+          'Send the picture: PNG, JPEG, GeoTIFF, a page of a PDF, or a DXF drawing.',
+          'Click three or more corners far apart and give the place of each; a fourth shows which one is wrong.',
+          'Trace finds outline and walls: say of what the walls are and accept them, or use the outline for the plan.',
+        ],
+      },
+    ],
+  },
+  {
     id: 'preflight',
     title: 'Before take-off',
     group: 'Fly',
@@ -146,6 +211,21 @@ export const PAGES: readonly Page[] = [
           'Hold stops the aircraft where it is, at one tap, always.',
           'When the page loses the server the aircraft goes on with its procedure; its own failsafe brings it back when the server loses the aircraft.',
           'Return flies home and lands; Land lands where it is.',
+        ],
+      },
+    ],
+  },
+  {
+    id: 'plan-change',
+    title: 'Change the plan in flight',
+    group: 'Fly',
+    blocks: [
+      {
+        steps: [
+          'Edit and save the plan. What is flown stays as it was; a notice says that another revision is saved.',
+          'Review the change: what differs, what is still to fly by either, and why it is refused where it is.',
+          'With control, hold Fly revision for a second: it is flown from the next waypoint.',
+          'Undo goes back to the revision that was flown before.',
         ],
       },
     ],
@@ -214,6 +294,21 @@ export const PAGES: readonly Page[] = [
     ],
   },
   {
+    id: 'conflict',
+    title: 'Two people changed one plan',
+    group: 'Screens',
+    blocks: [
+      { p: 'Somebody else saved this plan while it was open here. Both versions are shown, drawn to one scale.' },
+      {
+        list: [
+          'Take theirs: what was drawn here since is given up.',
+          'Keep mine, then save: theirs is replaced.',
+          'Decide later: nothing is saved; the next saving asks again.',
+        ],
+      },
+    ],
+  },
+  {
     id: 'anchors',
     title: 'Anchors',
     group: 'Screens',
@@ -224,7 +319,22 @@ export const PAGES: readonly Page[] = [
           'σ is one sigma; ± and ellipses are 95 %.',
           'Relative is against the base; absolute adds how well the base itself is known.',
           'Acceptance gates: each with its value and limit. One that fails withholds the anchor.',
-          'Residuals: what each range says against the answer. A curve over bearing is a lever arm or a wall.',
+          'Residuals: how far each range is from the solution. A curve over bearing is a lever arm or a wall.',
+        ],
+      },
+    ],
+  },
+  {
+    id: 'compare',
+    title: 'Compare two calibrations',
+    group: 'Screens',
+    blocks: [
+      { p: 'Both are shown as the shift of each anchor that they have in common, in millimetres east, north and up.' },
+      {
+        list: [
+          'MOVED: further than both covariances allow (99.9 %). The anchor was moved, or one of the two is wrong.',
+          'All of them shifted alike: the base had another place, the anchors did not move.',
+          'NOT COMPARABLE: one of the two gives no position of it.',
         ],
       },
     ],
@@ -239,8 +349,22 @@ export const PAGES: readonly Page[] = [
           'Every range that was stored, filtered and drawn: distance against RSS, features, impulse responses. A row can be taken ' +
           'out of use with a reason, and back.',
       },
+      { p: 'Label in the field records ranges with known truth, to train models from.' },
+    ],
+  },
+  {
+    id: 'campaign',
+    title: 'Label in the field',
+    group: 'Screens',
+    blocks: [
+      { p: 'Ranges with known truth are what models are trained from. They are kept as campaigns.' },
       {
-        p: 'Campaign takes ranges with known truth, to train models from: say distance, line of sight and wall, then take n samples.',
+        steps: [
+          'Stand still, with the tag where it measures in flight. Measure the true distance with a laser metre.',
+          'Type distance, line of sight or not, and the wall between: material and thickness.',
+          'Record: the next ranges of the anchor join the campaign with this truth.',
+          'Go to the next place; the form stays filled in. Other rooms are needed to test a model on.',
+        ],
       },
     ],
   },
@@ -251,7 +375,7 @@ export const PAGES: readonly Page[] = [
     blocks: [
       {
         p:
-          'A model says of each range whether it came through a wall, and how much too long it is. Without one, class reads unclear' +
+          'A model predicts of each range whether it came through a wall, and how much too long it is. Without one, class reads unclear' +
           ' and nothing is corrected.',
       },
       {
@@ -259,6 +383,21 @@ export const PAGES: readonly Page[] = [
           'False positives, a wall taken for line of sight, are worst: they are printed large.',
           'Test data must be of other places than training data; shared ones are called a leak.',
           'Promote takes effect with the next range. Roll back is one press.',
+        ],
+      },
+    ],
+  },
+  {
+    id: 'promote',
+    title: 'Promote a model',
+    group: 'Screens',
+    blocks: [
+      { p: 'A promoted model predicts every live range, from the next one on.' },
+      {
+        list: [
+          'The gate compares it with the active model on the same test data: false positives and mean error may not get worse.',
+          'A gate that is not passed needs a reason, which is kept in the audit log.',
+          'Roll back makes the one before active again, at one press.',
         ],
       },
     ],
@@ -287,6 +426,53 @@ export const PAGES: readonly Page[] = [
     ],
   },
   {
+    id: 'strip',
+    title: 'The status strip',
+    group: 'Screens',
+    blocks: [
+      { p: 'Six tiles in the same order on every view. Each opens a card with the reason and what to do.' },
+      {
+        head: ['Tile', 'Shows'],
+        rows: [
+          ['Link', 'LIVE; LATE after 2 s without new data; LOST after 5 s: then every value is struck, with its age'],
+          ['RTK', 'FIX: centimetres; FLOAT: decimetres; DGPS, SINGLE: metres; and the age of corrections'],
+          ['UWB', 'anchors in range in the last 2 s, of all that were seen in this flight'],
+          ['Drone', 'battery and mode; without a link to the autopilot, height and speed'],
+          ['Recording', 'how long this flight is recorded'],
+          ['Alarms', 'how many stand'],
+        ],
+      },
+    ],
+  },
+  {
+    id: 'access',
+    title: 'Who may do what',
+    group: 'Screens',
+    blocks: [
+      {
+        p:
+          'A token says who you are. An admin makes one in System, Access, or with anchord token create; it is shown once.' +
+          ' Without tokens the server answers its own machine only.',
+      },
+    ],
+  },
+  {
+    id: 'alarms',
+    title: 'Alarms',
+    group: 'When something is missing',
+    blocks: [
+      {
+        list: [
+          'The line under the strip shows the most urgent one with what to do; the list has all of them.',
+          'Acknowledge makes one quiet; it stays listed until it is over.',
+          'Critical ones sound until they are acknowledged, a warning once; Mute is for two minutes.',
+          'Sound needs one tap on the sound chip: a browser is silent before.',
+          'While the link is lost alarms read when last seen: nothing is assessed without data.',
+        ],
+      },
+    ],
+  },
+  {
     id: 'withheld',
     title: 'An anchor is withheld',
     group: 'When something is missing',
@@ -295,7 +481,7 @@ export const PAGES: readonly Page[] = [
         p: 'Withheld means: measured, and not good enough to be published. Its reason is in the review and in its detail.',
       },
       {
-        head: ['It says', 'It means', 'Do'],
+        head: ['Reason', 'Meaning', 'Do'],
         rows: [
           [
             'Ambiguous',
@@ -361,8 +547,9 @@ export const PAGES: readonly Page[] = [
   },
 ];
 export const page_of = (id: string | null): Page => PAGES.find((p) => p.id === id) ?? PAGES[0]!;
-/// The page for what is on the screen.
-export function page_for(hash: string): string {
-  const view = /^#\/?(\w+)/.exec(hash)?.[1] ?? 'live';
-  return PAGES.some((p) => p.id === view) ? view : 'live';
+/// The page of this name, or for what is at this address: `#/system/connect` has one of its own, a page of the guide is its own.
+export function page_for(name_or_hash: string): string {
+  const [view = 'live', part = ''] = name_or_hash.replace(/^#\/?|\?.*/g, '').split('/'),
+    known = (id: string): boolean => PAGES.some((p) => p.id === id);
+  return [part, view].find(known) ?? 'live';
 }

@@ -41,7 +41,7 @@ export function CampaignMode({
     </label>
   );
   return (
-    <section class="cell-p wide take" data-testid="campaign-mode" aria-label="Label in the field">
+    <section class="cell-p wide take" data-help="campaign" data-testid="campaign-mode" aria-label="Label in the field">
       <div class="hd">
         <h2>Label in the field</h2>
         <span class="meta">
@@ -54,8 +54,8 @@ export function CampaignMode({
         </button>
       </div>
       <p class="why">
-        Stand still, type what the laser metre says, press Record. The next ranges of the anchor join the campaign with
-        this truth. The form stays filled in for the next place.
+        Stand still, type the distance that the laser metre shows, press Record. The next ranges of the anchor join the
+        campaign with this truth. The form stays filled in for the next place.
       </p>
       <datalist id="campaign-names">
         {campaigns.map((c) => (

@@ -79,7 +79,12 @@ export function ExcludePanel({
     if (sample && !picked.includes(sample.id)) set_picked([...picked, sample.id]);
   };
   return (
-    <section class="cell-p wide exclude" aria-label="Measurements out of use" data-testid="exclusions">
+    <section
+      class="cell-p wide exclude"
+      data-help="measurements"
+      aria-label="Measurements out of use"
+      data-testid="exclusions"
+    >
       <div class="hd">
         <h2>Out of use</h2>
         <span class="grow" />
@@ -200,7 +205,7 @@ export function ExcludePanel({
                       disabled={busy}
                       onClick={() => void act(() => include(mission, e.id, key.current), 'Used again')}
                     >
-                      Re-include
+                      Use again
                     </button>
                   ) : (
                     'out of use'

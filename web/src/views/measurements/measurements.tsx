@@ -52,8 +52,18 @@ export function Measurements() {
         {!source && (
           <div class="empty small">
             <Empty cls="" loaded={synced.value && desk.campaigns_loaded}>
-              Nothing has been measured yet. Fly, import a flight folder, or import a campaign with ground truth.
+              Nothing has been measured yet. Ranges come with a flight, or as a campaign with known truth.
             </Empty>
+            <span class="ways">
+              <a class="btn" href="#/live">
+                Go to Live
+              </a>
+              {may('operator') && (
+                <a class="btn" href="#/import">
+                  Import a flight
+                </a>
+              )}
+            </span>
           </div>
         )}
         {source && !current && !problem && <NotLoaded cls="pad" />}
@@ -129,30 +139,32 @@ function Toolbar({
   return (
     <div class="toolbar">
       <h1>Measurements</h1>
-      <select
-        class="input"
-        aria-label="Flight or campaign"
-        data-testid="source"
-        value={source?.id ?? ''}
-        onChange={(e) => desk.choose(e.currentTarget.value)}
-      >
-        <optgroup label="Flights">
-          {missions.map((s) => (
-            <option key={s.id} value={s.id}>
-              {s.name}
-            </option>
-          ))}
-        </optgroup>
-        {campaigns.length > 0 && (
-          <optgroup label="Campaigns">
-            {campaigns.map((s) => (
+      {source && (
+        <select
+          class="input"
+          aria-label="Flight or campaign"
+          data-testid="source"
+          value={source?.id ?? ''}
+          onChange={(e) => desk.choose(e.currentTarget.value)}
+        >
+          <optgroup label="Flights">
+            {missions.map((s) => (
               <option key={s.id} value={s.id}>
                 {s.name}
               </option>
             ))}
           </optgroup>
-        )}
-      </select>
+          {campaigns.length > 0 && (
+            <optgroup label="Campaigns">
+              {campaigns.map((s) => (
+                <option key={s.id} value={s.id}>
+                  {s.name}
+                </option>
+              ))}
+            </optgroup>
+          )}
+        </select>
+      )}
       <span class="mut" data-testid="counts" role="status">
         {count}
       </span>

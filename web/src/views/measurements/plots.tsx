@@ -145,7 +145,7 @@ export function LevelPanel({
           : of === 'none'
             ? 'RSS against measured distance'
             : fitted?.of === of
-              ? 'that data set has too few LOS measurements with a level for a line'
+              ? 'that data set has too few LOS measurements with an RSS for a line'
               : 'fitting the line'}
         {hit?.los != null && `; ${share(hit.los)} of LOS above`}
         {hit?.nlos != null && `; ${share(hit.nlos)} of NLOS below`}

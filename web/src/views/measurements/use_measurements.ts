@@ -167,7 +167,7 @@ export function useMeasurements() {
       )
         return;
       if (keys_on.value && (e.key === 'j' || e.key === 'k')) step(e.key === 'j' ? 1 : -1);
-      if (e.key === 'Escape') set_sample(null);
+      if (e.key === 'Escape' && !e.defaultPrevented) set_sample(null);
     };
     addEventListener('keydown', on_key);
     return () => removeEventListener('keydown', on_key);

@@ -74,7 +74,7 @@ export function useTake(campaigns: readonly Source[], taken: (campaign: string) 
         const kept = await import_lines(name, truth_query(place), lines_of(rows), idempotency_key());
         const dropped = kept.dropped.map((d) => `${d.count} ${d.reason}`).join(', ');
         set_done(
-          `${kept.accepted} of ${rows.length} kept as ${setting_of(place)}${dropped && `; dropped: ${dropped}`}`,
+          `${kept.accepted} of ${rows.length} kept as ${setting_of(place)}${dropped && `; rejected: ${dropped}`}`,
         );
         taken(name);
         look();

@@ -36,7 +36,7 @@ export function ConfusionPanel({
         {grouped(los + nlos)} measurements, {held_out ? 'places never trained on' : 'cross-validated by place'}
       </p>
       <table class="cm">
-        <caption class="sr">Counts of true and said class; NLOS called LOS is the error to avoid</caption>
+        <caption class="sr">Counts of true and predicted class; NLOS called LOS is the error to avoid</caption>
         <thead>
           <tr>
             <td />
@@ -78,7 +78,7 @@ export function ConfusionPanel({
             />
           )}
           <br />
-          NLOS called LOS: the error to avoid at all cost, its range enters with full weight.
+          NLOS called LOS: the worst error, since its range enters with full weight.
         </p>
       </div>
     </section>

@@ -78,8 +78,11 @@ export function Models({ path }: { path: string | null }) {
             <h1>{chosen ? method_words(chosen.method) : 'Models'}</h1>
             {chosen && (
               <span class="mut">
-                run {chosen.id.slice(0, 8)}, {chosen.dataset}
-                {chosen.seconds === null ? '' : `, ${fixed(chosen.seconds, 0)} s`}, {chosen.created_by}
+                run {chosen.id.slice(0, 8)} on data set {chosen.dataset},{' '}
+                {chosen.seconds === null
+                  ? 'begun'
+                  : `trained in ${chosen.seconds < 1 ? 'less than 1' : fixed(chosen.seconds, 0)} s`}{' '}
+                by {chosen.created_by}
               </span>
             )}
             {chosen && <StateChip run={chosen} active={active} />}
@@ -225,7 +228,7 @@ function Numbers({ run, numbers }: { run: Run; numbers: RunNumbers }) {
           <p class="why">
             {why_words(run.why)}
             {run.nll !== null &&
-              `. Mean negative log-likelihood on held-out places ${fixed(run.nll, 3)}, constants ${fixed(run.nll_constants, 3)}.`}
+              `. Mean negative log-likelihood on held-out places ${fixed(run.nll, 3)}, of a constant prediction ${fixed(run.nll_constants, 3)}.`}
           </p>
         </section>
       )}
@@ -257,9 +260,17 @@ function Nothing() {
     <div class="empty small">
       <p>No model has been trained for this task yet. Ranges are used as they come until one is promoted.</p>
       <p class="mut">
-        Import a campaign with ground truth, freeze a data set and post a training run; docs/cookbook.md has each step
-        with curl.
+        Record ranges with known truth first: Measure, Label in the field. An engineer then makes a data set of them and
+        trains by curl; docs/cookbook.md has each step.
       </p>
+      <span class="ways">
+        <a class="btn" href="#/measurements">
+          Go to Measure
+        </a>
+        <a class="btn" href="#/guide/campaign">
+          How to label
+        </a>
+      </span>
     </div>
   );
 }

@@ -23,7 +23,7 @@ export function Promote({
     [reason, set_reason] = useState(''),
     [busy, set_busy] = useState(false),
     key = useRef(idempotency_key()),
-    box = useDialog<HTMLElement>(true, close);
+    box = useDialog<HTMLElement>(close, 'promote');
   useEffect(() => {
     gate_of(model).then(set_gate, (e: unknown) => set_problem(error_text(e)));
   }, [model]);
@@ -40,14 +40,7 @@ export function Promote({
     set_busy(false);
   };
   return (
-    <section
-      class="drawer"
-      role="dialog"
-      aria-labelledby="promote-title"
-      tabIndex={-1}
-      ref={box}
-      data-testid="promote-dialog"
-    >
+    <section class="drawer" {...box} aria-labelledby="promote-title" data-testid="promote-dialog">
       <div class="hd big">
         <h2 id="promote-title">Promote {name}</h2>
         <span class="grow" />

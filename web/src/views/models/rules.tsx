@@ -88,9 +88,7 @@ export function Rules() {
       {!sets && <NotLoaded failed={problem !== ''} />}
       {sets?.length === 0 && <p class="why">No data set is frozen yet.</p>}
       {shown && shown.rows.length === 0 && (
-        <p class="why">
-          This data set has nothing a rule could look at: no level, no impulse response, no repeated ranges.
-        </p>
+        <p class="why">This data set has nothing a rule could use: no RSS, no impulse response, no repeated ranges.</p>
       )}
       {shown && shown.rows.length > 0 && (
         <table class="tbl">

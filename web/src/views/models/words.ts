@@ -32,6 +32,11 @@ const METHODS: Record<string, string> = {
   raw: 'No correction',
 };
 const plain_words = (m: string): string => METHODS[m] ?? m.replaceAll('_', ' ').replace(/^./, (c) => c.toUpperCase());
+/// `c=3` as it is written in the field: C = 3.
+const setting_words = (s: string): string => {
+  const [name = '', value = ''] = s.split('=').map((x) => x.trim());
+  return `${name === 'c' ? 'C' : name.replaceAll('_', ' ')}${value && ` = ${value}`}`;
+};
 /// A method as its run names it, with settings and features where it tells them: "logistic(c=3) on 3 features".
 export function method_words(m: string | null): string {
   if (!m) return 'Automatic';
@@ -39,7 +44,7 @@ export function method_words(m: string | null): string {
   return parts
     ? [
         plain_words(parts[1]!),
-        ...(parts[2] ? parts[2].split(',').map((s) => s.trim().replace('=', ' ').replaceAll('_', ' ')) : []),
+        ...(parts[2] ? parts[2].split(',').map(setting_words) : []),
         ...(parts[3] ? [parts[3]] : []),
       ].join(', ')
     : plain_words(m);
@@ -76,7 +81,7 @@ const FEATURES: Record<string, string> = {
   range_m: 'Distance',
   range_db: 'Distance, dB',
   rx_dbm: 'RSS',
-  fp_dbm: 'First-path level',
+  fp_dbm: 'First-path power',
   rx_minus_fp_db: 'RX-FP difference',
   noise_excess_db: 'Noise excess',
   fp_snr_db: 'First-path SNR',

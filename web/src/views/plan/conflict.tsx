@@ -1,6 +1,7 @@
 /// Somebody else saved meanwhile: both versions side by side, drawn to one scale and in words; the person decides.
 import type { Plan } from '../../api/plans';
 import type { Geodetic } from '../../map/enu';
+import { useDialog } from '../../ui/use_dialog';
 import { Drawing, line } from '../chart';
 import { corners, to_m, type Shape } from './draft';
 import { differences } from './differences';
@@ -11,18 +12,21 @@ export function Conflict({
   origin,
   keep_mine,
   take_theirs,
+  later,
 }: {
   mine: Plan;
   theirs: Plan;
   origin: Geodetic | null;
   keep_mine: () => void;
   take_theirs: () => void;
+  later: () => void; ///< the next saving asks again
 }) {
+  const box = useDialog<HTMLDivElement>(later, 'conflict');
   const lines = differences(mine, theirs);
   return (
     <div
       class="callout caution conflict"
-      role="alertdialog"
+      {...box}
       aria-label="The plan was changed by somebody else"
       data-testid="conflict"
     >
@@ -31,6 +35,9 @@ export function Conflict({
           <b>Somebody else saved this plan meanwhile (revision {theirs.revision}).</b> Nothing of either is lost yet.
         </span>
         <span class="actions">
+          <button class="btn" onClick={later}>
+            Decide later
+          </button>
           <button class="btn" onClick={take_theirs}>
             Take theirs
           </button>

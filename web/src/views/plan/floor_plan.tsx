@@ -57,7 +57,7 @@ export function FloorPlanDialog({ corners, close, use_outline }: Props) {
     [held, set_held] = useState<Held | null>(null),
     [problem, set_problem] = useState(''),
     [busy, set_busy] = useState(''),
-    box = useDialog<HTMLElement>(true, close);
+    box = useDialog<HTMLElement>(close, 'floor-plan');
   const work = (what: string, job: () => Promise<void>): void => {
     set_busy(what);
     set_problem('');
@@ -77,15 +77,7 @@ export function FloorPlanDialog({ corners, close, use_outline }: Props) {
     );
   });
   return (
-    <section
-      class="drawer floorplan"
-      role="dialog"
-      aria-modal="false"
-      aria-labelledby="floorplan-title"
-      tabIndex={-1}
-      ref={box}
-      data-testid="floor-plan"
-    >
+    <section class="drawer floorplan" {...box} aria-labelledby="floorplan-title" data-testid="floor-plan">
       <div class="hd big">
         <h2 id="floorplan-title">Floor plan</h2>
         <span class="grow" />

@@ -20,10 +20,12 @@ export interface Rover {
   readonly heading_deg: number | null;
   readonly fix: FixClass;
   readonly sigma_h_m: number | null;
+  readonly age_ms: number;
   readonly fresh: boolean;
   readonly flies: boolean; ///< it is an aircraft's
 }
-export function rover_of(scene: Scene | null, origin: Geodetic, now_ms: number): Rover | null {
+/// `lost`: the link is, and what came last is not fresh however short a time ago it came.
+export function rover_of(scene: Scene | null, origin: Geodetic, now_ms: number, lost: boolean): Rover | null {
   const pose = scene?.pose;
   if (!pose || pose.value.lon === null || pose.value.lat === null) return null;
   const { lon, lat, heading_deg, fix, sigma_m } = pose.value;
@@ -33,7 +35,8 @@ export function rover_of(scene: Scene | null, origin: Geodetic, now_ms: number):
     heading_deg,
     fix,
     sigma_h_m: sigma_m && Math.hypot(sigma_m[0], sigma_m[1]),
-    fresh: now_ms - pose.at_ms < FRESH_MS,
+    age_ms: now_ms - pose.at_ms,
+    fresh: !lost && now_ms - pose.at_ms < FRESH_MS,
     flies: scene?.procedure?.value.drone?.connected === true,
   };
 }
@@ -120,7 +123,7 @@ export function plan_content(
   scene: Scene | null,
   near: Around | null,
   known: ReadonlyMap<string, AnchorRow>,
-  running: boolean,
+  flight: { readonly running: boolean; readonly link_lost: boolean },
   picked: number | null,
 ): Content {
   const shifted = new Scene('plan'),
@@ -160,8 +163,7 @@ export function plan_content(
     anchors: [...anchors.values()],
     selected: null,
     scene: shifted,
-    link_lost: false,
-    running,
+    ...flight,
     flight: {
       outline: plan.outline.map((c) => to_m(c, origin)),
       fence: [],

@@ -3,8 +3,8 @@ import { useEffect, useState } from 'preact/hooks';
 import { devices } from '../../api/devices';
 import type { Plan } from '../../api/plans';
 import type { Geodetic } from '../../map/enu';
-import { current_scene, now_ms, say, tick } from '../../state/store';
-import { fixed } from '../../ui/format';
+import { current_scene, now_ms, say, tick, watched_lost } from '../../state/store';
+import { age, fixed } from '../../ui/format';
 import { added, corners, from_m, to_m, with_corners, type Shape } from './draft';
 import { corners_of_walk, no_corner, rover_of, walked } from './ground';
 import type { Point } from './tools';
@@ -47,7 +47,8 @@ export function OnGround({
 }) {
   tick.value;
   const scene = current_scene(),
-    rover = rover_of(scene, origin, now_ms()),
+    lost = watched_lost(),
+    rover = rover_of(scene, origin, now_ms(), lost),
     pose = scene?.pose?.value,
     path = (points: readonly Point[]): string =>
       points
@@ -64,7 +65,7 @@ export function OnGround({
     <g class="onground">
       {trail.length > 1 && <path class="track" d={path(trail)} />}
       {way.length > 1 && <path class="walk" d={path(way)} data-testid="walk" />}
-      {base && <Base at={px(base)} />}
+      {base && <Base at={px(base)} lost={lost} />}
       {rover && (
         <g
           class={rover.fresh ? 'rover' : 'rover old'}
@@ -76,19 +77,21 @@ export function OnGround({
             d={rover.heading_deg === null ? 'M0 -12L12 0L0 12L-12 0z' : 'M0 -16L12 14L0 7L-12 14z'}
           />
           <text class="halo" x="16" y="4">
-            {rover.flies ? 'aircraft' : 'rover'}
-            {rover.fresh ? ` ${FIX_WORDS[rover.fix]}` : ', last known'}
+            {rover.flies ? 'aircraft' : 'rover'}{' '}
+            <tspan class={rover.fresh ? '' : 'stale'}>{FIX_WORDS[rover.fix]}</tspan>
+            {rover.fresh ? '' : ` ${age(rover.age_ms)} old`}
           </text>
         </g>
       )}
     </g>
   );
 }
-const Base = ({ at: [x, y] }: { at: [number, number] }) => (
-  <g class="base" data-testid="plan-base" transform={`translate(${x} ${y})`}>
+const Base = ({ at: [x, y], lost }: { at: [number, number]; lost: boolean }) => (
+  <g class={lost ? 'base old' : 'base'} data-testid="plan-base" transform={`translate(${x} ${y})`}>
     <path d="M0 -10L9 7H-9zM0 -10V-16M-5 -14A6 6 0 0 1 5 -14" />
     <text class="halo" x="14" y="4">
-      base
+      <tspan class={lost ? 'stale' : ''}>base</tspan>
+      {lost ? ' last known' : ''}
     </text>
   </g>
 );
@@ -111,7 +114,7 @@ export function RoverTools({
 }) {
   tick.value;
   const scene = current_scene(),
-    rover = rover_of(scene, origin, now_ms()),
+    rover = rover_of(scene, origin, now_ms(), watched_lost()),
     missing = no_corner(rover),
     ring = drawing !== 'waypoints';
   const way = walk === null ? [] : walked(scene, walk, origin);
@@ -161,7 +164,7 @@ export function RoverTools({
           data-testid="walk-outline"
           aria-pressed={walk !== null}
           disabled={walk === null && missing !== ''}
-          title={missing || 'Carry the rover once round, then stop: the corners are found'}
+          title={missing || 'Carry the rover once round the building, then stop: the corners are found'}
           onClick={() => (walk === null ? set_walk(scene?.pose?.value.t_us ?? 0) : stop())}
         >
           {walk !== null ? `Stop walking (${fixed(length_m, 0)} m)` : 'Walk it'}

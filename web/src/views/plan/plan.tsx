@@ -8,7 +8,7 @@ import { Elevation } from '../../map/elevation_box';
 import { elevation_shown } from '../../map/elevation_shown';
 import type { Geodetic } from '../../map/enu';
 import { may } from '../../state/session';
-import { current_mission, current_scene, now_ms, tick } from '../../state/store';
+import { current_mission, current_scene, now_ms, tick, watched_lost } from '../../state/store';
 import { NotLoaded } from '../../ui/empty';
 import { age } from '../../ui/format';
 import { Icon } from '../../ui/marks';
@@ -59,9 +59,14 @@ export function Plan({ id }: { id: string | null }) {
           origin={origin}
           keep_mine={desk.keep_mine}
           take_theirs={() => desk.open(theirs)}
+          later={desk.decide_later}
         />
       )}
-      {flown && flown.plan === plan.id && <PlanNotice p={flown} />}
+      {flown && flown.plan === plan.id && (
+        <div class={watched_lost() ? 'lost' : ''}>
+          <PlanNotice p={flown} />
+        </div>
+      )}
       {floor_plan_open.value && <FloorPlan desk={desk} />}
       <div class="planbody">
         <Drawn desk={desk} shown={shown} />
@@ -248,7 +253,7 @@ function Drawn({ desk, shown }: { desk: Desk; shown: Shown }) {
           cells={cells(check, shown, plan, origin)}
           anchors={placed(plan, known, origin)}
           base={base}
-          rover={rover_of(current_scene(), origin, now_ms())?.m ?? null}
+          rover={rover_of(current_scene(), origin, now_ms(), watched_lost())?.m ?? null}
           walk={walk}
           sided={sided}
           set_sided={(on) => (elevation_shown.value = on)}
@@ -278,7 +283,7 @@ function PlanElevation({ desk, origin }: { desk: Desk; origin: Geodetic }) {
         scene,
         around(plan, origin, mission, scene),
         known,
-        mission?.state === 'recording',
+        { running: mission?.state === 'recording', link_lost: watched_lost() },
         waypoint,
       );
     };

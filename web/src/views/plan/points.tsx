@@ -276,7 +276,7 @@ const FIELDS: readonly (readonly [NumberSetting, string, number])[] = [
   ['k', 'Steps k', 0],
   ['grid_step_m', 'Grid step, m', 1],
   ['target_sigma_m', 'Target σ, m', 3],
-  ['max_iterations', 'Iterations, most', 0],
+  ['max_iterations', 'Iterations, at most', 0],
 ];
 const RULES = {
   d_optimal: 'most information (D)',

@@ -100,7 +100,7 @@ export function PredictedPanel({ check, shown, set }: { check: Check | null; sho
       <div class="scrollx" tabIndex={0} role="region" aria-label="Expected by height">
         <table class="tbl">
           <caption class="sr">
-            Expected of anchors assumed 5 m apart inside the outline, by their height: middle and worst
+            Expected of anchors assumed 5 m apart inside the outline, by their height: median and worst
           </caption>
           <thead>
             <tr>
@@ -137,7 +137,7 @@ export function PredictedPanel({ check, shown, set }: { check: Check | null; sho
         </table>
       </div>
       <p class="sub" title="The dissertation's eq 8.5 is the trace without the root: the square of this">
-        Middle and worst of anchors assumed 5 m apart. GDOP is √trace, of the measuring points within 60 m.
+        Median and worst of anchors assumed 5 m apart. GDOP is √trace, of the measuring points within 60 m.
       </p>
     </section>
   );

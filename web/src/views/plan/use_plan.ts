@@ -240,6 +240,7 @@ export function usePlan(id: string | null) {
     redo,
     keep,
     keep_mine,
+    decide_later: (): void => set_theirs(null),
     propose,
     bring,
     take_away,

@@ -15,15 +15,19 @@ import {
   replayed,
   synced,
   tick,
+  watched_lost,
   when_back,
   link,
 } from '../../state/store';
+import { may } from '../../state/session';
 import { clock, fixed, told_apart } from '../../ui/format';
-import { Chip, Mark } from '../../ui/marks';
+import { AlarmRow } from '../../ui/alarm_row';
+import { Chip } from '../../ui/marks';
 import { AnchorCard } from '../anchor_card';
 import '../flight/flight.css';
 import { sentence, Stage } from '../flight/procedure';
 import { STATUS_LOOK } from '../flight/words';
+import { EventRow } from '../events';
 import { RangeList } from '../range_list';
 import { not_loaded_words } from '../../ui/empty';
 import { useStable } from '../../ui/use_stable';
@@ -157,14 +161,24 @@ export function Replay({ id }: { id: string | null }) {
   if (!mission)
     return (
       <div class="empty">
+        <h1 class="sr">Replay</h1>
         <p role="status">
           {synced.value && link.value !== 'lost'
-            ? 'No flight is stored under this address.'
+            ? id
+              ? 'No flight is stored under this address.'
+              : 'No flight is stored yet: the first one that is flown or imported can be replayed here.'
             : not_loaded_words(link.value)}
         </p>
-        <a class="btn" href="#/live">
-          Go to Live
-        </a>
+        <span class="ways">
+          <a class="btn" href="#/live">
+            Go to Live
+          </a>
+          {!id && may('operator') && (
+            <a class="btn" href="#/import">
+              Import a flight
+            </a>
+          )}
+        </span>
       </div>
     );
   const scene = player?.scene ?? null,
@@ -207,7 +221,7 @@ export function Replay({ id }: { id: string | null }) {
             anchors: shown_estimates(scene),
             selected,
             scene: player?.scene ?? null,
-            link_lost: false,
+            link_lost: watched_lost(),
             running: true,
           })}
           onSelect={(a) => (chosen_anchor.value = a)}
@@ -291,16 +305,9 @@ function Then({ player }: { player: Player }) {
       {alarms.length > 0 && (
         <section class="sec-p" data-testid="replay-alarms">
           <h2>Alarms at this moment</h2>
-          <ul class="plain">
+          <ul class="alarmrows">
             {alarms.map((a) => (
-              <li key={a.id}>
-                <Mark
-                  shape={a.level === 'critical' ? 'bad' : 'caution'}
-                  tone={a.level === 'critical' ? 'bad' : 'caution'}
-                />{' '}
-                <b>{a.id}</b> {a.text && sentence(a.text)}{' '}
-                <span class="mut">for {clock((player.t_us - a.since_us) / 1e6, true)}</span>
-              </li>
+              <AlarmRow key={a.id} a={a} stood={clock((player.t_us / 1000 - a.since_ms) / 1000, true)} />
             ))}
           </ul>
         </section>
@@ -356,15 +363,11 @@ function Marks({ player, go }: { player: Player; go: (t_us: number) => void }) {
         {marks.slice(Math.max(0, here - 3), here + 6).map((m, k) => {
           const i = Math.max(0, here - 3) + k;
           return (
-            <li key={i} aria-current={i === here ? 'step' : undefined}>
+            <EventRow key={i} e={m} here={i === here}>
               <button class="btn small" onClick={() => go(m.t_us)}>
                 {clock((m.t_us - from_us) / 1e6)}
               </button>
-              <span class={i === here ? 'now' : ''}>
-                <span class="sr">{m.level}: </span>
-                {m.text}
-              </span>
-            </li>
+            </EventRow>
           );
         })}
       </ul>

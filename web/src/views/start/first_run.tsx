@@ -32,7 +32,7 @@ export function FirstRun() {
   };
   const url = new URL('.', document.baseURI.split('#')[0]).toString().replace(/\/$/, '');
   return (
-    <div class="firstrun" data-testid="first-run">
+    <div class="firstrun" data-help="first" data-testid="first-run">
       <div class="start">
         <h1>No flight yet</h1>
         <p class="lead">
@@ -76,7 +76,7 @@ export function FirstRun() {
               <h2>Bring a flight</h2>
               <p>
                 A folder, tables (.csv) or an archive (.zip) of a flight that was flown already. Columns with other
-                names are told on a page.
+                names are assigned on a page.
               </p>
               <a class="btn primary" href="#/import" data-testid="import-flight">
                 Import a flight

@@ -84,7 +84,7 @@ export function Import() {
     input.value = '';
   };
   return (
-    <div class="firstrun import" data-testid="import">
+    <div class="firstrun import" data-help="import" data-testid="import">
       <div>
         <h1>Import a flight</h1>
         <p class="lead">

@@ -26,7 +26,7 @@ export function base_words(s: Pick<Site, 'source' | 'sigma_m' | 'frame'>): {
     return {
       tone: 'caution',
       word: 'NOT KNOWN',
-      text: 'Nobody said how the place of the base is known: anchors are right relative to it, and no absolute accuracy can be given.',
+      text: 'It is not stated how the position of the base is known: anchors are right relative to it, and no absolute accuracy can be given.',
     };
   if (s.source === 'survey_in')
     return {
@@ -42,7 +42,7 @@ export function base_words(s: Pick<Site, 'source' | 'sigma_m' | 'frame'>): {
     word: s.source === 'network' ? 'NETWORK' : 'KNOWN POINT',
     text:
       s.sigma_m === null
-        ? 'How well it is known was not said.'
+        ? 'Its accuracy is not stated.'
         : `Known to ${accuracy(s.sigma_m)} (1σ), which is part of every absolute accuracy.`,
   };
 }
@@ -76,7 +76,7 @@ export function BasePanel() {
     reported = bases?.find((d) => d.base)?.base ?? null,
     admin = may('admin');
   return (
-    <section class="sys-p" data-testid="base">
+    <section class="sys-p" data-help-part="base" data-testid="base">
       <div class="hd">
         <h2>Base</h2>
         {list && list.length > 1 && (

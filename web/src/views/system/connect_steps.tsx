@@ -26,7 +26,7 @@ export function ConnectSteps({
   const steps = connect_steps(rows, found, radios),
     left = steps.filter((s) => s.state !== 'done').length;
   return (
-    <section class="callout connect" aria-label="Connect my devices" data-testid="connect-steps">
+    <section class="callout connect" data-help="connect" aria-label="Connect my devices" data-testid="connect-steps">
       <h3>Connect my devices</h3>
       <ol>
         {steps.map((s) => {

@@ -79,7 +79,7 @@ export function DeviceDetail({ row: { d, recent }, radios, operator, busy, run, 
                   <Q v={fixed(d.clock.sigma_s === null ? null : d.clock.sigma_s * 1000, 2)} u="ms" />
                 </>
               ) : (
-                'being listened to'
+                'being measured'
               )}
             </dd>
           </div>

@@ -68,6 +68,7 @@ export function DeviceForm({
   return (
     <form
       class="callout device-form"
+      data-help="connect"
       data-testid="device-form"
       aria-label={device ? `Settings of ${device.name}` : 'A new device'}
       onSubmit={(e) => {

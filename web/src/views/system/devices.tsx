@@ -351,7 +351,7 @@ function FoundList({
                   ? 'not allowed'
                   : f.configured
                     ? ''
-                    : 'nothing known spoke'}
+                    : 'no known device answered'}
             </b>
             {f.evidence && !command_in(f.evidence) && ` ${f.evidence}`}{' '}
             {f.configured

@@ -32,7 +32,7 @@ export function LeverPanel() {
     flight.track_point !== 'tag_antenna' &&
     (flight.tags.length === 0 || flight.tags.every((t) => t.lever_arm_body_m.every((x) => x === 0)));
   return (
-    <section class="sys-p" data-testid="levers">
+    <section class="sys-p" data-help-part="lever-arm" data-testid="levers">
       <div class="hd">
         <h2>Lever arms</h2>
         {flight && (
@@ -43,13 +43,15 @@ export function LeverPanel() {
         )}
       </div>
       {flight === undefined && <NotLoaded failed={failed} />}
-      {flight === null && <p class="why">They come with a flight; there is none yet.</p>}
+      {flight === null && (
+        <p class="why">Lever arms come with a flight, and there is none yet: fly one, or import one.</p>
+      )}
       {flight && <p class="why">From {POINTS[flight.track_point] ?? flight.track_point} to each UWB antenna.</p>}
       {none && (
         <div class="callout caution" role="status">
-          <b>Not set.</b> The UWB antenna counts as being at {POINTS[flight.track_point]}. Measure the way between the
-          two and give it with the next flight (tags of POST /missions): every centimetre of it is a centimetre of each
-          anchor.
+          <b>Not set.</b> The UWB antenna counts as being at {POINTS[flight.track_point]}. Measure from there to the UWB
+          antenna and give it with the next flight (tags of POST /missions, or the page of the import): every centimetre
+          of it is a centimetre of each anchor.
         </div>
       )}
       {flight && flight.tags.length > 0 && (

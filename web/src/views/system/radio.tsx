@@ -71,6 +71,7 @@ export function RadioPanel({
   return (
     <form
       class="callout"
+      data-help="radio"
       data-testid="radio"
       aria-label={`Radio of ${device.name}`}
       onSubmit={(e) => {
@@ -182,7 +183,7 @@ export function RadioPanel({
         )}
       </div>
       {changed && busy === '' && (
-        <p class="mut">Where one device does not follow, all go back to the settings of now.</p>
+        <p class="mut">Where one device does not follow, all go back to their present settings.</p>
       )}
     </form>
   );

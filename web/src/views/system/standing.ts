@@ -47,23 +47,23 @@ const DROPPED: Readonly<Record<string, string>> = {
   no_answer: 'an anchor did not answer',
   refused: 'the tag refused to range',
   zero_distance: 'distance 0, the value of a failed exchange',
-  stale_range: 'the range before once more',
+  stale_range: 'a repeated range',
   distance_impossible: 'a distance no radio reaches',
-  rss_impossible: 'a signal level that cannot be',
-  not_acknowledged: 'an anchor did not take the order',
-  no_event: 'the tag never said it was done',
+  rss_impossible: 'an impossible RSS',
+  not_acknowledged: 'an anchor did not accept the command',
+  no_event: 'the tag did not report the end of the range',
   no_cir: 'no impulse response',
   no_compass: 'no compass',
   no_reply: 'no reply on the cable',
   bad_reply: 'an unreadable reply',
-  stray_line: 'a line nobody asked for',
+  stray_line: 'an unexpected line',
   byte_outside_any_frame: 'bytes of no message',
   other_format: 'another format than the one in use',
   no_time: 'no time yet',
   no_fix: 'no fix',
   no_ellipsoidal_height: 'no height above the ellipsoid',
-  implausible_position: 'a position that cannot be',
-  repeated_epoch: 'the epoch before once more',
+  implausible_position: 'an impossible position',
+  repeated_epoch: 'a repeated epoch',
   out_of_order: 'out of order',
   caster_refused: 'the caster refused',
   no_rtcm_bytes: 'bytes that are no RTCM',
@@ -83,7 +83,7 @@ const DROPPED: Readonly<Record<string, string>> = {
   too_many_tags: 'more than 64 tags',
   retained: 'messages that the broker kept from before',
   write_refused: 'the device takes no more bytes',
-  write_without_link: 'nobody to send to',
+  write_without_link: 'no receiver to send to',
   port_conflict: 'the port is taken by another device here',
   driver_fault: 'a fault of anchord itself',
 };
@@ -195,7 +195,7 @@ function silent(d: Device, noise = /make no frame/.test(d.reason)): Standing {
   if (d.kind === 'pozyx')
     return bad(
       'SILENT',
-      noise ? 'The cable is open, but what comes cannot be read.' : 'The cable is open, but the tag says nothing.',
+      noise ? 'The cable is open, but what comes cannot be read.' : 'The cable is open, but the tag sends nothing.',
       noise
         ? 'Is this port a Pozyx at all? Discover shows it. If it is: unplug it and plug it in again, then try another cable.'
         : 'Unplug the tag and plug it in again. If it stays silent: another cable, another port.',
@@ -222,7 +222,7 @@ function silent(d: Device, noise = /make no frame/.test(d.reason)): Standing {
     );
   return bad(
     'SILENT',
-    noise ? 'Bytes come, but none of them can be read.' : 'The link is open, but the receiver says nothing.',
+    noise ? 'Bytes come, but none of them can be read.' : 'The link is open, but the receiver sends nothing.',
     noise
       ? 'Edit: the baud rate, or the format, is another one.'
       : 'Switch its output on (position, NMEA or UBX) in the receiver, or check its baud rate.',
@@ -272,7 +272,7 @@ function delivering(d: Device, recent: Lately): Standing {
       return caution(
         'FEW RANGES',
         `More is rejected than used.${why}`,
-        'Details shows what was dropped, and how often.',
+        'Details shows what was rejected, and how often.',
       );
   }
   if (d.kind === 'pozyx') {
@@ -285,7 +285,7 @@ function delivering(d: Device, recent: Lately): Standing {
         most = none ? 'Every' : 'Nearly every';
       if (!first)
         return say(
-          'The tag talks, but it knows no anchor to range to.',
+          'The tag answers, but it knows no anchor to range to.',
           'Switch anchors on in its reach. If they are on, their radio settings differ: Radio.',
         );
       if (first[0] === 'no_answer')
@@ -310,7 +310,7 @@ function delivering(d: Device, recent: Lately): Standing {
         );
       return say(
         `${most} exchange fails: ${dropped_words(first[0])}.`,
-        'Details shows what was dropped, and how often.',
+        'Details shows what was rejected, and how often.',
       );
     }
   }
@@ -326,7 +326,7 @@ function delivering(d: Device, recent: Lately): Standing {
         low[0],
         low[1],
         fix === 'none'
-          ? 'The receiver talks, but it has no position.'
+          ? 'The receiver sends, but it has no position.'
           : fix === 'float'
             ? 'The position is good to decimetres, not centimetres; ranges taken now weigh less.'
             : 'The position is good to metres only.',
@@ -336,8 +336,8 @@ function delivering(d: Device, recent: Lately): Standing {
       return bad(
         'NO POSITIONS',
         first
-          ? `It talks, but nothing of it can be used: ${dropped_words(first[0])}.`
-          : 'It talks, but sends no positions.',
+          ? `It sends, but nothing of it can be used: ${dropped_words(first[0])}.`
+          : 'It is connected, but sends no positions.',
         first?.[0] === 'no_ellipsoidal_height'
           ? 'Let the receiver send the height above the ellipsoid (GGA with geoid separation, or UBX NAV-PVT).'
           : 'Let the receiver send positions: GGA with GST, UBX NAV-PVT, ERB or LLH.',
@@ -352,21 +352,21 @@ function delivering(d: Device, recent: Lately): Standing {
       return caution(
         'FEW POSITIONS',
         `More is lost than used: ${dropped_words(first[0])}.`,
-        'Details shows what was dropped, and how often.',
+        'Details shows what was rejected, and how often.',
       );
     // A receiver's text at start-up is some lines; what goes on is the line.
     if (noise_bytes(recent.dropped) > 20 * recent.span_s)
       return caution(
         'NOISY',
-        `Garbage comes between its messages: ${noise_bytes(recent.dropped)} bytes in ${Math.round(recent.span_s)} s. What is whole is used.`,
+        `Unreadable bytes come between its messages: ${noise_bytes(recent.dropped)} bytes in ${Math.round(recent.span_s)} s. What is whole is used.`,
         'A loose plug, a cable beside motor wires, or two formats mixed.',
       );
   }
   // Linked for less than the five seconds that a verdict takes: not wrong yet, but nothing was delivered that would make it working.
   if (d.kind === 'gnss' && !d.rover && recent.rows === 0)
-    return stand('estimating', 'info', 'OPENING', 'It talks; waiting for its first position.');
+    return stand('estimating', 'info', 'OPENING', 'It is connected; waiting for its first position.');
   if (of_ranges(d) && !d.counters.ranges && recent.rows === 0)
-    return stand('estimating', 'info', 'OPENING', 'It talks; waiting for its first range.');
+    return stand('estimating', 'info', 'OPENING', 'It is connected; waiting for its first range.');
   return stand('ok', 'ok', 'WORKING');
 }
 /// `same_id_speaks`: another device here with this one's id has a link.
@@ -379,7 +379,7 @@ export function standing(d: Device, recent: Lately, same_id_speaks = true): Stan
   if (same_id && !linked)
     return caution(
       'ELSEWHERE',
-      sentence(without_ids(d.conflict).replace('is also', 'speaks as')),
+      sentence(without_ids(d.conflict).replace('is also', 'identifies itself as')),
       'If the tag was moved to another port: forget this one. If these are two tags: one needs another id.',
     );
   if (same_id)
@@ -412,7 +412,7 @@ export function standing(d: Device, recent: Lately, same_id_speaks = true): Stan
     return bad(
       'CLOCK WRONG',
       `Its clock runs ${Math.round(Math.abs(d.clock.drift_ppm))} ppm too ` +
-        `${d.clock.drift_ppm > 0 ? 'fast' : 'slow'}: beyond any sound crystal, so its times cannot be trusted.`,
+        `${d.clock.drift_ppm > 0 ? 'fast' : 'slow'}: beyond any crystal that works, so its times cannot be trusted.`,
       'Use another tag; have this one repaired.',
     );
   return now;

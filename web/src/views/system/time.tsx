@@ -155,8 +155,8 @@ function Aircraft({ drone: d }: { drone: DroneMsg | null }) {
       <h2>Aircraft</h2>
       {!d ? (
         <p class="why">
-          Flown by hand: this server talks to no autopilot. The setting drone.address (MAVLink, like udp://:14550) gives
-          it one at its next start.
+          Flown by hand: this server has no link to an autopilot. The setting drone.address (MAVLink, like udp://:14550)
+          gives it one at its next start.
         </p>
       ) : (
         <>
