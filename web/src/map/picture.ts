@@ -7,6 +7,7 @@ import { to_px, type Camera } from './camera';
 import { round_length } from './enu';
 import { draw_flight, numbered, type FlightPicture } from './flight_layer';
 import { palette_of, range_colour, status_colour, trail_style, type Palette } from './palette';
+import { draw_tiles } from './tiles';
 import { anchor_symbol, beyond, drone, ellipse_at, label, mirror_dots, reticle, type Box, type Ctx } from './symbols';
 
 export interface Content {
@@ -63,7 +64,7 @@ export function draw_backdrop(c: Ctx, cam: Camera, b: Backdrop): void {
     [right, top] = to_px(cam, b.high);
   c.save();
   c.globalAlpha = 0.5;
-  c.drawImage(b.image, left, top, right - left, bottom - top);
+  if (!draw_tiles(c, cam, b)) c.drawImage(b.image, left, top, right - left, bottom - top);
   c.restore();
 }
 /// Symbols and labels, above the ranges: a line must never strike out a name.
