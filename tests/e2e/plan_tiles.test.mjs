@@ -5,10 +5,10 @@ import { openBrowser, openPage, picture, text } from './browser.mjs';
 import { drawn_png } from './room.mjs';
 import { eventually, startServer } from './server.mjs';
 
-// 180 x 30 m at 2 cm a pixel, its middle at the site's origin; a wall round it, and about its middle lines of 2 pixels with as much between them: two and
-// more of these are one pixel of a backdrop of 4096.
-const WIDTH = 9000,
-  HEIGHT = 1500,
+// 360 x 15 m at 2 cm a pixel, its middle at the site's origin; a wall round it, and about its middle lines of 2 pixels with as much between them: one of
+// each is less than a pixel of a backdrop of 4096.
+const WIDTH = 18_000,
+  HEIGHT = 750,
   M_PER_PX = 0.02;
 const plan = () =>
   drawn_png(
@@ -19,7 +19,7 @@ const plan = () =>
       y < 15 ||
       x >= WIDTH - 15 ||
       y >= HEIGHT - 15 ||
-      (x > 3900 && x < 5100 && y > 300 && y < 1200 && x % 4 < 2),
+      (x > 8400 && x < 9600 && y > 100 && y < 650 && x % 4 < 2),
   );
 
 let browser, server, floor;
@@ -57,31 +57,32 @@ test('the floor says which tiles there are, and each is served with its ETag, or
   const { levels, href, north_west_m, sha256 } = floor.tiles;
   assert.deepEqual(
     levels.map(({ level, columns, rows }) => [level, columns, rows]),
-    // Of 256 x 64 pixels of the plan a side, and half of that each time.
+    // Of 32 768 pixels of the plan a side, and half of that each time.
     [
       [0, 1, 1],
       [1, 2, 1],
       [2, 3, 1],
       [3, 5, 1],
-      [4, 9, 2],
-      [5, 18, 3],
-      [6, 36, 6],
+      [4, 9, 1],
+      [5, 18, 1],
+      [6, 36, 2],
+      [7, 71, 3],
     ],
   );
   assert.ok(Math.abs(levels.at(-1).m_per_px - M_PER_PX) < 1e-6, `${levels.at(-1).m_per_px}`);
-  assert.ok(Math.abs(north_west_m[0] + 90) < 0.01 && Math.abs(north_west_m[1] - 15) < 0.01, `${north_west_m}`);
+  assert.ok(Math.abs(north_west_m[0] + 180) < 0.01 && Math.abs(north_west_m[1] - 7.5) < 0.01, `${north_west_m}`);
   const at = (level, column, row, headers = {}) =>
     server.fetch(href.replace('{level}', level).replace('{column}', column).replace('{row}', row), { headers });
-  const tile = await at(6, 17, 2);
+  const tile = await at(7, 35, 1);
   assert.equal(tile.status, 200);
   assert.equal(tile.headers.get('content-type'), 'image/png');
   assert.equal(tile.headers.get('etag'), `"${sha256}"`);
   const bytes = Buffer.from(await tile.arrayBuffer());
   assert.deepEqual([bytes.readUInt32BE(16), bytes.readUInt32BE(20)], [256, 256]);
-  assert.equal((await at(6, 17, 2, { 'if-none-match': `"${sha256}"` })).status, 304);
-  const outside = await at(6, 36, 0);
+  assert.equal((await at(7, 35, 1, { 'if-none-match': `"${sha256}"` })).status, 304);
+  const outside = await at(7, 71, 0);
   assert.equal(outside.status, 404);
-  assert.match((await outside.json()).detail, /level 6 of the plan has columns 0 to 35 and rows 0 to 5/);
+  assert.match((await outside.json()).detail, /level 7 of the plan has columns 0 to 70 and rows 0 to 2/);
 });
 
 /** How far light and dark are apart in the middle row of the plan under the map: the lines, or their grey. */
@@ -117,17 +118,22 @@ test('near by, the map asks for the tiles in sight alone, is sharper by them tha
   away = false;
   await eventually('the lines are seen', async () => (await contrast(id)) > 150, 20_000);
   await picture(page, 'plan-tiles');
-  // Of the last level, 5.12 m a side, from (-90, 15) m.
+  // Of the last level, 5.12 m a side, from (-180, 7.5) m.
   const [w, h] = await id('under-plan').evaluate((c) => [c.width, c.height]),
     side = 256 * M_PER_PX,
     [de, dn] = [w / 2 / px_per_m, h / 2 / px_per_m],
     in_sight = [];
-  for (let row = Math.floor((15 - dn) / side); row < Math.ceil((15 + dn) / side); row++)
-    for (let column = Math.floor((90 - de) / side); column < Math.ceil((90 + de) / side); column++)
-      if (row >= 0 && row < 6) in_sight.push(`6/${column}/${row}`);
+  for (let row = Math.floor((7.5 - dn) / side); row < Math.ceil((7.5 + dn) / side); row++)
+    for (let column = Math.floor((180 - de) / side); column < Math.ceil((180 + de) / side); column++)
+      if (row >= 0 && row < 3) in_sight.push(`7/${column}/${row}`);
   await eventually('all in sight were asked for', async () => in_sight.every((tile) => asked.includes(tile)));
   assert.deepEqual([...asked].sort(), [...in_sight].sort(), 'each once, and no others');
-  assert.ok(in_sight.length < 40, `${in_sight.length} of 216`);
+  assert.ok(in_sight.length < 40, `${in_sight.length} of 213`);
+
+  assert.deepEqual(
+    seen.errors.filter((line) => !/ERR_FAILED/.test(line)), // the tiles that were kept away
+    [],
+  );
 
   process.kill(server.pid, 'SIGSTOP');
   try {
@@ -139,9 +145,5 @@ test('near by, the map asks for the tiles in sight alone, is sharper by them tha
   } finally {
     process.kill(server.pid, 'SIGCONT');
   }
-  assert.deepEqual(
-    seen.errors.filter((line) => !/ERR_FAILED/.test(line)), // the tiles that were kept away
-    [],
-  );
   await page.close();
 });
