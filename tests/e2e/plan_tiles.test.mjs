@@ -2,6 +2,7 @@
 import assert from 'node:assert/strict';
 import { after, before, test } from 'node:test';
 import { openBrowser, openPage, picture, text } from './browser.mjs';
+import { ndjson, simulatedFlight } from './flight.mjs';
 import { drawn_png } from './room.mjs';
 import { eventually, startServer } from './server.mjs';
 
@@ -145,5 +146,60 @@ test('near by, the map asks for the tiles in sight alone, is sharper by them tha
   } finally {
     process.kill(server.pid, 'SIGCONT');
   }
+  await page.close();
+});
+
+/** Pixels of the map below everything that moves that are ink, half as strong, on the ground of the light theme. */
+const ink = (page) =>
+  page.evaluate(() => {
+    let n = 0;
+    for (const c of document.querySelectorAll('main .mapcanvas canvas')) {
+      if (!c.width) continue;
+      const { data } = c.getContext('2d').getImageData(0, 0, c.width, c.height);
+      for (let i = 0; i < data.length; i += 4) {
+        const [r, g, b] = [data[i], data[i + 1], data[i + 2]];
+        if (r > 105 && r < 130 && Math.abs(r - g) < 10 && Math.abs(r - b) < 10) n++;
+      }
+    }
+    return n;
+  });
+
+test('Live draws the same tiles under a flight over the plan', async () => {
+  const { mission, fixes } = await simulatedFlight({ duration: 30 }),
+    post = async (path, options) => {
+      const answer = await server.fetch(path, { method: 'POST', ...options });
+      assert.ok(answer.ok, `${path}: ${answer.status} ${await answer.clone().text()}`);
+      return answer.json();
+    };
+  const flown = await post('/api/v1/missions', { json: mission });
+  // Over the middle of the plan.
+  const there = fixes.map((fix) => ({
+    ...fix,
+    mission: flown.id,
+    lon: fix.lon - fixes[0].lon + 3.7,
+    lat: fix.lat - fixes[0].lat + 51,
+  }));
+  await post('/api/v1/fixes', { body: ndjson(there), headers: { 'content-type': 'application/x-ndjson' } });
+  const { page, seen, id } = await openPage(browser, server);
+  const asked = new Set();
+  let away = true;
+  await page.route(/\/plan\/tiles\//, (route) => {
+    if (away) return route.abort();
+    asked.add(route.request().url().split('/tiles/')[1].split('/')[0]);
+    return route.continue();
+  });
+  await id('level').waitFor({ timeout: 20_000 });
+  await page.getByRole('button', { name: 'Follow drone' }).click();
+  for (let i = 0; i < 2; i++) await page.getByRole('button', { name: 'Zoom in' }).click();
+  await page.waitForRequest(/\/plan\/tiles\//, { timeout: 20_000 });
+  const blurred = await ink(page);
+  away = false;
+  await eventually('the lines are seen', async () => (await ink(page)) > blurred + 3000, 20_000, 100);
+  await picture(page, 'plan-tiles-live');
+  assert.ok(asked.has('7') && !asked.has('5'), `${[...asked]}: of the last level, and of one that the zoom passed`);
+  assert.deepEqual(
+    seen.errors.filter((line) => !/ERR_FAILED/.test(line)),
+    [],
+  );
   await page.close();
 });
