@@ -1,3 +1,4 @@
+#include <charconv>
 #include <nlohmann/json.hpp>
 
 #include "api/admin/job_answer.hpp"
@@ -134,6 +135,21 @@ std::string png_of(const Json& answer) {
   return *png;
 }
 
+/// Has the plan cut into tiles and keeps them, or says why there are none: it has its backdrop all the same.
+void tile(PlaceApi& s, Floor& floor, Ordered& document, const floor_plan::PlanTransform& transform,
+          const std::string& picture) {
+  auto made = ask_for_tiles(s.run_work, s.steady, transform, picture);
+  floor.tiles.reset();
+  if (!made) {
+    document["tiles_missing"] = made.error().message;
+    return;
+  }
+  auto& tiles = made.value().what;
+  tiles.id = PlanTilesId{make_uuid_v7(s.clock.now())};
+  value_or_problem(s.places.keep(floor.id, tiles, made.value().pictures));
+  floor.tiles = tiles;
+}
+
 /// Has the plan turned north up, and keeps that with where it lies. The floor is not stored yet.
 void place(PlaceApi& s, Floor& floor, const Georeference& georeference, const std::string& picture) {
   const Json made = worked(s, {PlanTask::backdrop, georeference.transform}, picture);
@@ -145,6 +161,7 @@ void place(PlaceApi& s, Floor& floor, const Georeference& georeference, const st
   auto document = kept_json(georeference.document.text);
   const auto &low = made.at("low_m"), &high = made.at("high_m");
   document["extent_m"] = {low.at(0), low.at(1), high.at(0), high.at(1)};
+  tile(s, floor, document, georeference.transform, picture);
   floor.georeference = {to_wire(document)};
   floor.proposal = {};
 }
@@ -201,6 +218,7 @@ Response put_plan(PlaceApi& s, const Request& request) {
   floor.preview =
       stored(s, ImageKind::preview, "image/png", preview_head.width_px, preview_head.height_px, preview);
   floor.backdrop.reset();
+  floor.tiles.reset();
   floor.georeference = floor.proposal = {};
   value_or_problem(s.places.keep(floor.id, *floor.plan, picture));
   value_or_problem(s.places.keep(floor.id, *floor.preview, preview));
@@ -230,6 +248,47 @@ Response picture(PlaceApi& s, const Request& request, std::optional<StoredImage>
   return response;
 }
 
+/// A number of the path; nothing where it is none that a tile could have.
+std::optional<int> path_count(const Request& request, const char* name) {
+  const auto& text = request.params.at(name);
+  int value = 0;
+  const auto [end, fault] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (fault != std::errc() || end != text.data() + text.size()) return std::nullopt;
+  return value;
+}
+
+Response tile_picture(PlaceApi& s, const Request& request) {
+  check_query(request, {});
+  const Floor floor = path_floor(s, request);
+  if (!floor.tiles)
+    throw_problem(404, "not-found",
+                  floor.backdrop ? "the plan has no tiles: tiles_missing of the floor says why"
+                                 : "the plan is not placed: PUT .../plan/georeference");
+  const auto& tiles = *floor.tiles;
+  const auto level = path_count(request, "level"), column = path_count(request, "column"),
+             row = path_count(request, "row");
+  if (!level || *level < 0 || *level >= tiles.n_levels)
+    throw_problem(404, "not-found",
+                  "the plan has no tiles of level " + request.params.at("level") + ", but of levels 0 to " +
+                      std::to_string(tiles.n_levels - 1));
+  if (!column || !row || !is_tile_of(tiles, *level, *column, *row))
+    throw_problem(404, "not-found",
+                  "level " + std::to_string(*level) + " of the plan has columns 0 to " +
+                      std::to_string(tile_columns(tiles, *level) - 1) + " and rows 0 to " +
+                      std::to_string(tile_rows(tiles, *level) - 1) + ", and no tile at column " +
+                      request.params.at("column") + ", row " + request.params.at("row"));
+  Response response;
+  response.header("ETag", '"' + tiles.sha256_hex + '"').header("Content-Type", "image/png");
+  // Unchanged pictures are not read.
+  if (request.header("if-none-match") == '"' + tiles.sha256_hex + '"') return response;
+  auto png = value_or_problem(s.places.tile(tiles.id, *level, *column, *row));
+  if (png)
+    response.body = std::move(*png);
+  else
+    response.status = 204;
+  return response;
+}
+
 Response remove_plan(PlaceApi& s, const Request& request) {
   check_query(request, {});
   Floor floor = path_floor(s, request);
@@ -238,6 +297,7 @@ Response remove_plan(PlaceApi& s, const Request& request) {
   floor.plan.reset();
   floor.preview.reset();
   floor.backdrop.reset();
+  floor.tiles.reset();
   floor.georeference = floor.proposal = {};
   value_or_problem(s.places.update(floor, floor.version));
   s.audit(request, "floor.plan.delete " + to_string(floor.id));
@@ -264,6 +324,7 @@ Response put_georeference(PlaceApi& s, const Request& request) {
   if (try_out) {
     floor.georeference = found.document;
     floor.backdrop.reset();
+    floor.tiles.reset();
     return answer(200, floor);
   }
   if (found.wrong) throw_problem(422, "validation", *found.wrong, {{"/points", "outlier", *found.wrong}});
@@ -344,6 +405,7 @@ void add_floor_plan_routes(Router& router, PlaceApi& s) {
   shows(plan, &Floor::plan, "the floor has no plan");
   shows(plan + "/preview", &Floor::preview, "the floor has no plan");
   shows(plan + "/backdrop", &Floor::backdrop, "the plan is not placed: PUT .../plan/georeference");
+  router.add({Method::get, plan + "/tiles/{level}/{column}/{row}", readers(), on(tile_picture)});
   router.add(
       as_heavy({Method::put, plan + "/georeference", writers, on(put_georeference), 1 << 20, false, true}));
   router.add({Method::post, plan + "/trace", writers, on(post_trace)});

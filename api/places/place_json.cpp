@@ -1,9 +1,11 @@
 #include "api/places/place_json.hpp"
 
+#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "api/kit/or_null.hpp"
 #include "api/kit/reader.hpp"
+#include "api/places/plan_work.hpp"
 
 namespace anchord::api {
 
@@ -20,6 +22,27 @@ Ordered building_json(const Building& b) {
           {"created_at", to_rfc3339(b.created)}};
 }
 
+namespace {
+
+Ordered tiles_json(const Floor& f, const Ordered& origin) {
+  const auto& t = f.tiles.value();
+  Ordered levels = Ordered::array();
+  for (int level = 0; level < t.n_levels; ++level)
+    levels.push_back({{"level", level},
+                      {"m_per_px", std::ldexp(t.m_per_px, t.n_levels - 1 - level)},
+                      {"columns", tile_columns(t, level)},
+                      {"rows", tile_rows(t, level)}});
+  return {{"href", "/api/v1/floors/" + to_string(f.id) + "/plan/tiles/{level}/{column}/{row}"},
+          {"origin", origin},
+          {"north_west_m", {t.west_m, t.north_m}},
+          {"tile_px", floor_plan::k_tile_px},
+          {"levels", std::move(levels)},
+          {"bytes", t.bytes},
+          {"sha256", t.sha256_hex}};
+}
+
+}  // namespace
+
 Ordered floor_json(const Floor& f) {
   Ordered out{{"id", to_string(f.id)},
               {"building", to_string(f.building)},
@@ -29,6 +52,8 @@ Ordered floor_json(const Floor& f) {
               {"plan", nullptr},
               {"georeference", kept_json(f.georeference.text)},
               {"backdrop", nullptr},
+              {"tiles", nullptr},
+              {"tiles_missing", nullptr},
               {"traced", !f.proposal.empty()},
               {"outline", nullptr},
               {"n_walls", 0}};
@@ -49,7 +74,13 @@ Ordered floor_json(const Floor& f) {
                        {"height_px", f.backdrop->height_px},
                        {"sha256", f.backdrop->sha256_hex}};
   }
-  if (out["georeference"].is_object()) out["georeference"].erase("extent_m");
+  if (f.tiles && out["backdrop"].is_object())
+    out["tiles"] = tiles_json(f, out["georeference"]["origin"]);
+  else if (out["backdrop"].is_object())
+    out["tiles_missing"] = out["georeference"].value(
+        "tiles_missing", "the plan was placed by a version that made none: PUT .../plan/georeference again");
+  for (const char* ours : {"extent_m", "tiles_missing"})
+    if (out["georeference"].is_object()) out["georeference"].erase(ours);
   if (const auto kept = kept_json(f.structure.text); kept.is_object()) {
     out["outline"] = kept.value("outline", Ordered());
     out["n_walls"] = kept.contains("walls") ? kept["walls"].size() : 0;

@@ -1,10 +1,13 @@
 #include "api/places/plan_work.hpp"
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
+#include <utility>
 
 #include "api/kit/reader.hpp"
 #include "core/base/base64.hpp"
 #include "core/base/enum_table.hpp"
+#include "core/base/sha256.hpp"
 #include "core/base/steady.hpp"
 #include "core/base/to_wire.hpp"
 #include "core/floor_plan/backdrop.hpp"
@@ -22,9 +25,13 @@ namespace {
 constexpr std::string_view k_mark = "floor_plan ";
 constexpr auto k_task_words = enum_table<PlanTask>({{"inspect", PlanTask::inspect},
                                                     {"backdrop", PlanTask::backdrop},
+                                                    {"tiles", PlanTask::tiles},
                                                     {"trace", PlanTask::trace},
                                                     {"draw", PlanTask::draw},
                                                     {"page", PlanTask::page}});
+/// More than any plan has (core/floor_plan/tiles).
+constexpr int k_max_tile_levels = 16;
+constexpr std::int64_t k_max_tiled_px = 50'000;
 /// The head of a message that needs a program begins so.
 constexpr std::string_view k_page_mark = "floor_plan page ";
 
@@ -43,6 +50,72 @@ Result<std::string> backdrop(const floor_plan::Image& image, const floor_plan::P
                     floor_plan::encode_png_within(std::move(made.image), k_max_picture_bytes));
   return to_wire(
       Json{{"low_m", pair_json(made.low_m)}, {"high_m", pair_json(made.high_m)}, {"png", base64(png)}});
+}
+
+/// A line of JSON, then the pictures one behind the other.
+Result<std::string> tiles(const floor_plan::Image& image, const floor_plan::PlanTransform& transform) {
+  BOOST_OUTCOME_TRY(auto made, floor_plan::make_tiles(image, transform));
+  Json list = Json::array();
+  std::size_t bytes = 0;
+  for (const auto& tile : made.tiles) {
+    list.push_back({tile.level, tile.column, tile.row, tile.png.size()});
+    bytes += tile.png.size();
+  }
+  std::string out = to_wire(Json{{"north_west_m", pair_json(made.north_west_m)},
+                                 {"m_per_px", made.m_per_px},
+                                 {"width_px", made.width_px},
+                                 {"height_px", made.height_px},
+                                 {"n_levels", made.n_levels},
+                                 {"tiles", std::move(list)}}) +
+                    '\n';
+  out.reserve(out.size() + bytes);
+  for (auto& tile : made.tiles) out += std::exchange(tile.png, {});
+  return out;
+}
+
+Error unreadable() { return make_error(Errc::internal, "the worker's answer cannot be read"); }
+
+/// What a worker made of a stranger's picture may be anything: every number is looked at.
+Result<MadeTiles> read_tiles(std::string answer) {
+  MadeTiles out;
+  out.answer = std::move(answer);
+  const std::string_view text(out.answer);
+  const auto line_end = std::min(text.find('\n'), text.size());
+  const auto head = Json::parse(text.substr(0, line_end), nullptr, false);
+  try {
+    auto& what = out.what;
+    what.n_levels = head.at("n_levels").get<int>();
+    what.m_per_px = head.at("m_per_px").get<double>();
+    what.width_px = head.at("width_px").get<std::int64_t>();
+    what.height_px = head.at("height_px").get<std::int64_t>();
+    what.west_m = head.at("north_west_m").at(0).get<double>();
+    what.north_m = head.at("north_west_m").at(1).get<double>();
+    const bool sound = what.n_levels >= 1 && what.n_levels <= k_max_tile_levels && what.m_per_px > 0 &&
+                       what.width_px > 0 && what.width_px <= k_max_tiled_px && what.height_px > 0 &&
+                       what.height_px <= k_max_tiled_px;
+    if (!sound) return unreadable();
+    std::size_t at = line_end + 1;
+    Sha256 sum;
+    for (const auto& row : head.at("tiles")) {
+      PlanTile tile{row.at(0).get<int>(), row.at(1).get<int>(), row.at(2).get<int>(), {}};
+      const auto n = row.at(3).get<std::size_t>();
+      if (at > text.size() || n > text.size() - at || !is_tile_of(what, tile.level, tile.column, tile.row))
+        return unreadable();
+      tile.png = text.substr(at, n);
+      at += n;
+      const auto png = floor_plan::image_head(std::as_bytes(std::span(tile.png)));
+      if (!png || png.value().format != floor_plan::ImageFormat::png ||
+          png.value().width_px != floor_plan::k_tile_px || png.value().height_px != floor_plan::k_tile_px)
+        return unreadable();
+      what.bytes += static_cast<std::int64_t>(n);
+      sum.add(tile.png);
+      out.pictures.push_back(tile);
+    }
+    what.sha256_hex = sum.hex();
+  } catch (const Json::exception&) {
+    return unreadable();
+  }
+  return out;
 }
 
 Result<std::string> trace(const floor_plan::Image& image, const floor_plan::PlanTransform& transform,
@@ -127,6 +200,11 @@ int plan_work_cpu_s(std::string_view message) {
   return head.is_object() ? head.value("cpu_s", k_picture_cpu_s) : k_picture_cpu_s;
 }
 
+bool is_tile_of(const PlanTiles& tiles, int level, int column, int row) {
+  return level >= 0 && level < tiles.n_levels && column >= 0 && column < tile_columns(tiles, level) &&
+         row >= 0 && row < tile_rows(tiles, level);
+}
+
 Error too_busy(int cpu_s) {
   return make_error(Errc::no_convergence,
                     "the picture kept its decoder busy for more than " + std::to_string(cpu_s) +
@@ -162,6 +240,8 @@ Result<std::string> do_plan_work(std::string_view message, const std::stop_token
         return inspect(std::move(image));
       case PlanTask::backdrop:
         return backdrop(image, transform);
+      case PlanTask::tiles:
+        return tiles(image, transform);
       case PlanTask::trace:
         return trace(image, transform, stop, progress);
       case PlanTask::draw:
@@ -185,9 +265,11 @@ Result<std::string> plan_work_inline(const std::string& message, const WorkProgr
                       {});
 }
 
-Result<Json> ask_worker(const RunWork& run, const SteadyClock& steady, const PlanQuestion& question,
-                        std::string_view picture, const WorkProgressSink& progress,
-                        const std::function<bool()>& canceled) {
+namespace {
+
+Result<std::string> asked(const RunWork& run, const SteadyClock& steady, const PlanQuestion& question,
+                          std::string_view picture, const WorkProgressSink& progress,
+                          const std::function<bool()>& canceled) {
   const auto& m = question.transform.linear;
   const auto& shift = question.transform.shift_m;
   Json head{{"task", k_task_words.word(question.task)},
@@ -211,11 +293,25 @@ Result<Json> ask_worker(const RunWork& run, const SteadyClock& steady, const Pla
     return make_error(Errc::no_convergence,
                       "the picture was not read within " + std::to_string(static_cast<int>(k_plan_work_s)) +
                           " s: save it smaller, or send it when the server is less busy");
-  BOOST_OUTCOME_TRY(const auto text, answer);
+  return answer;
+}
+
+}  // namespace
+
+Result<Json> ask_worker(const RunWork& run, const SteadyClock& steady, const PlanQuestion& question,
+                        std::string_view picture, const WorkProgressSink& progress,
+                        const std::function<bool()>& canceled) {
+  BOOST_OUTCOME_TRY(const auto text, asked(run, steady, question, picture, progress, canceled));
   Json out;
-  if (parse_json(text, out) || !out.is_object())
-    return make_error(Errc::internal, "the worker's answer cannot be read");
+  if (parse_json(text, out) || !out.is_object()) return unreadable();
   return out;
+}
+
+Result<MadeTiles> ask_for_tiles(const RunWork& run, const SteadyClock& steady,
+                                const floor_plan::PlanTransform& transform, std::string_view picture) {
+  BOOST_OUTCOME_TRY(auto answer,
+                    asked(run, steady, {PlanTask::tiles, transform}, picture, {}, [] { return false; }));
+  return read_tiles(std::move(answer));
 }
 
 }  // namespace anchord::api

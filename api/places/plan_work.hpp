@@ -12,6 +12,8 @@
 
 #include "api/learning/worker_port.hpp"
 #include "core/floor_plan/georeference.hpp"
+#include "core/floor_plan/tiles.hpp"
+#include "core/types/place.hpp"
 
 namespace anchord {
 class SteadyClock;
@@ -25,7 +27,7 @@ inline constexpr double k_plan_dpi = 200, k_min_plan_dpi = 50, k_max_plan_dpi = 
 
 /// Processor time that a picture may take of its worker, and again of the programs that the worker runs: one
 /// that takes more was made for that. 100 million pixels of noise take 6 s, their tracing 19 s.
-inline constexpr int k_picture_cpu_s = 30, k_trace_cpu_s = 120;
+inline constexpr int k_picture_cpu_s = 30, k_tiles_cpu_s = 60, k_trace_cpu_s = 120;
 /// Until work is given up that others leave no processor for: a worker is below them in rank.
 inline constexpr double k_plan_work_s = 600;
 
@@ -33,6 +35,7 @@ inline constexpr double k_plan_work_s = 600;
 enum class PlanTask : std::uint8_t {
   inspect,   ///< {width_px, height_px, preview}: decoded whole once, so that a broken file is refused at once
   backdrop,  ///< {low_m, high_m, width_px, height_px, png}
+  tiles,     ///< ask_for_tiles
   trace,     ///< {outline_m, walls, cell_m, notes}
   draw,      ///< {png, drawing_m_from_pixel, is_at_site}: of a DXF
   page,      ///< {png, pages}: of a PDF
@@ -40,11 +43,15 @@ enum class PlanTask : std::uint8_t {
 
 struct PlanQuestion {
   PlanTask task{PlanTask::inspect};
-  floor_plan::PlanTransform transform{};        ///< backdrop, trace
+  floor_plan::PlanTransform transform{};        ///< backdrop, tiles, trace
   std::optional<Eigen::Vector2d> site_map_m{};  ///< draw: easting and northing of the site in its map system
   int page{1};                                  ///< page
   double dots_per_inch{k_plan_dpi};             ///< page: of paper, at most
-  int cpu_s() const { return task == PlanTask::trace ? k_trace_cpu_s : k_picture_cpu_s; }
+  int cpu_s() const {
+    return task == PlanTask::trace   ? k_trace_cpu_s
+           : task == PlanTask::tiles ? k_tiles_cpu_s
+                                     : k_picture_cpu_s;
+  }
 };
 
 /// The longest side of previews, and the most bytes of previews and backdrops.
@@ -77,5 +84,24 @@ Result<std::string> plan_work_inline(const std::string& message, const WorkProgr
 Result<nlohmann::json> ask_worker(const RunWork& run, const SteadyClock& steady, const PlanQuestion& question,
                                   std::string_view picture, const WorkProgressSink& progress,
                                   const std::function<bool()>& canceled);
+
+inline std::int64_t tile_columns(const PlanTiles& tiles, int level) {
+  return floor_plan::tiles_across(tiles.width_px, tiles.n_levels, level);
+}
+inline std::int64_t tile_rows(const PlanTiles& tiles, int level) {
+  return floor_plan::tiles_across(tiles.height_px, tiles.n_levels, level);
+}
+/// Whether the plan has such a level, column and row.
+bool is_tile_of(const PlanTiles& tiles, int level, int column, int row);
+
+/// Tiles as the worker made them; `what` has no id yet.
+struct MadeTiles {
+  PlanTiles what;
+  std::string answer;              ///< holds the bytes of the pictures
+  std::vector<PlanTile> pictures;  ///< into `answer`
+};
+/// As ask_worker, for the tiles of a plan: their bytes come as they are, behind a line of JSON.
+Result<MadeTiles> ask_for_tiles(const RunWork& run, const SteadyClock& steady,
+                                const floor_plan::PlanTransform& transform, std::string_view picture);
 
 }  // namespace anchord::api

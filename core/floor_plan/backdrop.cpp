@@ -21,19 +21,28 @@ cv::Mat reduced(const cv::Mat& from, double by) {
 
 }  // namespace
 
-Result<Backdrop> make_backdrop(const Image& rgb, const PlanTransform& transform, int longest_side_px) {
-  Backdrop out;
-  const double w = rgb.width_px, h = rgb.height_px;
-  out.low_m = out.high_m = transform.enu_from({0, 0});
+Result<Extent> extent_of(const Image& image, const PlanTransform& transform) {
+  const double w = image.width_px, h = image.height_px;
+  Extent out{transform.enu_from({0, 0}), transform.enu_from({0, 0})};
   for (const Eigen::Vector2d& corner :
        {Eigen::Vector2d(w, 0), Eigen::Vector2d(0, h), Eigen::Vector2d(w, h)}) {
     out.low_m = out.low_m.cwiseMin(transform.enu_from(corner));
     out.high_m = out.high_m.cwiseMax(transform.enu_from(corner));
   }
-  const Eigen::Vector2d extent = out.high_m - out.low_m;
-  if (!extent.allFinite() || extent.maxCoeff() > k_max_extent_m)
+  const Eigen::Vector2d size_m = out.high_m - out.low_m;
+  if (!size_m.allFinite() || size_m.maxCoeff() > k_max_extent_m)
     return make_error(Errc::invalid_argument,
                       "the plan would cover more than 5 km: check its points, or the unit of its map file");
+  return out;
+}
+
+Result<Backdrop> make_backdrop(const Image& rgb, const PlanTransform& transform, int longest_side_px) {
+  BOOST_OUTCOME_TRY(const auto covered, extent_of(rgb, transform));
+  Backdrop out;
+  out.low_m = covered.low_m;
+  out.high_m = covered.high_m;
+  const double w = rgb.width_px, h = rgb.height_px;
+  const Eigen::Vector2d extent = out.high_m - out.low_m;
   const double cell = std::max(transform.scale_m_per_px(), extent.maxCoeff() / longest_side_px);
   const int columns = std::clamp(static_cast<int>(std::ceil(extent.x() / cell)), 1, longest_side_px);
   const int rows = std::clamp(static_cast<int>(std::ceil(extent.y() / cell)), 1, longest_side_px);

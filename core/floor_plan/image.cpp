@@ -196,12 +196,13 @@ Result<Image> decode_image(Bytes bytes) {
   return make_error(Errc::internal, "unknown image format");
 }
 
-Result<std::string> encode_png(const Image& image) {
+Result<std::string> encode_png(const Image& image, PngEffort effort) {
   png_image png{};
   png.version = PNG_IMAGE_VERSION;
   png.width = static_cast<png_uint_32>(image.width_px);
   png.height = static_cast<png_uint_32>(image.height_px);
   png.format = image.channels == 1 ? PNG_FORMAT_GRAY : image.channels == 3 ? PNG_FORMAT_RGB : PNG_FORMAT_RGBA;
+  if (effort == PngEffort::fast) png.flags |= PNG_IMAGE_FLAG_FAST;
   std::string out(PNG_IMAGE_PNG_SIZE_MAX(png), '\0');
   png_alloc_size_t size = out.size();
   if (png_image_write_to_memory(&png, out.data(), &size, 0, image.pixels.data(), 0, nullptr) == 0)

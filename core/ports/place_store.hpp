@@ -1,6 +1,8 @@
 #pragma once
 
 #include <optional>
+#include <span>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -37,6 +39,13 @@ class PlaceStore {
   /// belongs to the floor once an update names it; what no update names goes with the floor's next one.
   virtual Result<void> keep(const FloorId& floor, const StoredImage& image, std::string_view bytes) = 0;
   virtual Result<std::string> bytes(const ImageId& image) = 0;
+
+  /// The same for the tiles of a plan. Those that no floor has any more are deleted in parts too.
+  virtual Result<void> keep(const FloorId& floor, const PlanTiles& tiles,
+                            std::span<const PlanTile> pictures) = 0;
+  /// The PNG of a tile; nothing where the plan has none there.
+  virtual Result<std::optional<std::string>> tile(const PlanTilesId& tiles, int level, int column,
+                                                  int row) = 0;
 };
 
 }  // namespace anchord

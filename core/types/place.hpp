@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <string_view>
 
 #include "core/base/enum_table.hpp"
 #include "core/base/ids.hpp"
@@ -14,6 +15,7 @@ namespace anchord {
 using BuildingId = Id<struct BuildingTag>;
 using FloorId = Id<struct FloorTag>;
 using ImageId = Id<struct ImageTag>;
+using PlanTilesId = Id<struct PlanTilesTag>;
 
 /// A building of a site, to which floors belong.
 struct Building {
@@ -43,6 +45,24 @@ struct StoredImage {
   std::string sha256_hex;
 };
 
+/// A plan in square pictures, which are read apart: level 0 is all of it on one, each level above has half
+/// the metres per pixel of the one below (core/floor_plan/tiles).
+struct PlanTiles {
+  PlanTilesId id{};
+  int n_levels{};
+  double m_per_px{};                     ///< of the last level
+  std::int64_t width_px{}, height_px{};  ///< that the plan takes of the last level
+  double west_m{}, north_m{};            ///< ENU of the georeference's origin: where all levels begin
+  std::int64_t bytes{};
+  std::string sha256_hex;
+};
+
+/// One of them. Columns count from the west, rows from the north.
+struct PlanTile {
+  int level{}, column{}, row{};
+  std::string_view png;
+};
+
 /// A floor of a building with its plan. The documents belong to api/places.
 struct Floor {
   FloorId id{};
@@ -51,6 +71,7 @@ struct Floor {
   double level{};                         ///< 0: ground; halves for mezzanines
   std::optional<double> base_height_m{};  ///< of its floor above the ground
   std::optional<StoredImage> plan{}, preview{}, backdrop{};
+  std::optional<PlanTiles> tiles{};
   Document georeference;  ///< where the plan lies, and how that is known
   Document proposal;      ///< what tracing found, for a person to accept
   Document structure;     ///< outline and walls that a person accepted

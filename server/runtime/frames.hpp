@@ -6,8 +6,8 @@
 
 namespace anchord::server {
 
-/// Messages between the server and its worker: 4 bytes of length, little endian, then that many of text. Over
-/// a stream socket whose other end may die at any time.
+/// Messages between the server and its worker: 4 bytes of length, little endian, then that many of text, or
+/// of bytes behind the word that announces them. Over a stream socket whose other end may die at any time.
 inline constexpr std::size_t k_max_frame_bytes = std::size_t{512} << 20;
 
 /// False when the other end is gone. Blocks.

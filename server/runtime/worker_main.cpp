@@ -112,9 +112,10 @@ int worker_main() {
   settle_for(message);
   std::stop_source stop;
   std::mutex writing;
-  const auto send = [&writing](const Json& json) {
+  const auto send = [&writing](const Json& json, const std::string* behind = nullptr) {
     const std::scoped_lock lock(writing);
     if (!write_frame(k_socket, to_wire(json))) _exit(1);
+    if (behind != nullptr && !write_frame(k_socket, *behind)) _exit(1);
   };
   // Hears the server while the work goes on: a word to stop, or its end.
   Thread listener("listener", [&stop] {
@@ -162,7 +163,7 @@ int worker_main() {
                                              (plan ? "" : "; the run, its rows and settings are kept"));
   }
   if (result)
-    send({{"op", "done"}, {"result", result.value()}});
+    send({{"op", "done"}}, &result.value());  // as it is: pictures are no text
   else
     send({{"op", "failed"},
           {"code", k_errc_words.word(result.error().code)},

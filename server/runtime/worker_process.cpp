@@ -159,6 +159,7 @@ Result<std::string> run(const std::filesystem::path& program, const std::string&
   if (!write_frame(ours.fd(), message)) return child.end(" before it began");
   std::optional<Steady::time_point> asked_to_stop;
   std::string text;
+  bool done = false;  // the next frame is the result
   while (true) {
     if (!asked_to_stop && canceled()) {
       asked_to_stop = Steady::now();
@@ -177,6 +178,7 @@ Result<std::string> run(const std::filesystem::path& program, const std::string&
       case FrameRead::frame:
         break;
     }
+    if (done) return text;
     // It may be anything: the worker ran on data from outside.
     auto json = Json::parse(text, nullptr, false);
     const auto word = [&](const char* key) {
@@ -189,7 +191,7 @@ Result<std::string> run(const std::filesystem::path& program, const std::string&
       if (!told) return unreadable("progress without stage, stage_index, stage_count, fraction, detail");
       if (progress) progress(*told);
     } else if (op == "done") {
-      return word("result");
+      done = true;
     } else if (op == "failed") {
       return failure_of(word("code"), word("message"));
     } else {

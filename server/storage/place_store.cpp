@@ -49,6 +49,31 @@ constexpr const char* k_part_insert =
 constexpr const char* k_part = "SELECT content FROM plan_image_part WHERE image_id = ?1 AND ordinal = ?2";
 constexpr const char* k_image_size = "SELECT bytes FROM plan_image WHERE id = ?1";
 
+/// Rows and bytes of tiles that one transaction writes, and rows that one deletes.
+constexpr std::size_t k_tile_rows = 256, k_tile_bytes = std::size_t{1} << 20;
+constexpr int k_tiles_deleted = 16;
+
+constexpr const char* k_tiles =
+    "SELECT id, n_levels, m_per_px, width_px, height_px, west_m, north_m, bytes, sha256 FROM plan_tiles "
+    "WHERE floor_id = ?1 AND named = 1";
+constexpr const char* k_tiles_insert =
+    "INSERT INTO plan_tiles (id, floor_id, named, n_levels, m_per_px, width_px, height_px, west_m, north_m, "
+    "bytes, sha256) VALUES (?1, ?2, 0, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10)";
+/// Changes nothing, and holds the row until the transaction ends.
+constexpr const char* k_tiles_hold =
+    "UPDATE plan_tiles SET named = named WHERE id = ?1 AND floor_id = ?2 RETURNING tiles_key";
+constexpr const char* k_tiles_name =
+    "UPDATE plan_tiles SET named = 1 WHERE id = ?1 AND floor_id = ?2 RETURNING tiles_key";
+constexpr const char* k_tiles_forget =
+    "UPDATE plan_tiles SET floor_id = NULL WHERE floor_id = ?1 AND id <> ?2";
+constexpr const char* k_tiles_of_nobody = "SELECT id FROM plan_tiles WHERE floor_id IS NULL LIMIT 1";
+constexpr const char* k_tiles_empty =
+    "DELETE FROM plan_tile WHERE tile_key IN (SELECT tile_key FROM plan_tile WHERE tiles_id = ?1 LIMIT ?2) "
+    "RETURNING tile_key";
+constexpr const char* k_tiles_delete = "DELETE FROM plan_tiles WHERE id = ?1";
+constexpr const char* k_tile =
+    "SELECT content FROM plan_tile WHERE tiles_id = ?1 AND level = ?2 AND tile_column = ?3 AND tile_row = ?4";
+
 Building read_building(Query& query) {
   Building b;
   b.id = query.id<BuildingId>();
@@ -94,6 +119,20 @@ Floor read_floor(Connection& c, Query& query) {
                : image.kind == ImageKind::preview ? f.preview
                                                   : f.backdrop;
     to = std::move(image);
+  }
+  Query tiles(c, k_tiles);
+  tiles << f.id;
+  if (tiles.step()) {
+    auto& t = f.tiles.emplace();
+    t.id = tiles.id<PlanTilesId>();
+    t.n_levels = tiles.as<int>();
+    t.m_per_px = tiles.real();
+    t.width_px = tiles.integer();
+    t.height_px = tiles.integer();
+    t.west_m = tiles.real();
+    t.north_m = tiles.real();
+    t.bytes = tiles.integer();
+    t.sha256_hex = tiles.text();
   }
   return f;
 }
@@ -178,7 +217,7 @@ class SqlPlaceStore final : public PlaceStore {
     });
   }
   Result<void> update(const Floor& f, std::uint64_t expected_version) override {
-    return write_void(gate_, [&](Connection& c) -> std::optional<Error> {
+    BOOST_OUTCOME_TRYV(write_void(gate_, [&](Connection& c) -> std::optional<Error> {
       if (!find_building(c, f.building)) return absent("building", f.building);
       Query query(c, k_floor_update);
       bind(query, f, expected_version + 1);
@@ -197,8 +236,10 @@ class SqlPlaceStore final : public PlaceStore {
       Query forget(c, k_images_forget);
       forget << f.id << named[0] << named[1] << named[2];
       forget.run();
-      return std::nullopt;
-    });
+      return change_tiles(c, f);
+    }));
+    delete_tiles_of_nobody();
+    return boost::outcome_v2::success();
   }
   Result<Floor> floor(const FloorId& id) override {
     return read_value<Floor>(gate_, [&](Connection& c) -> Result<Floor> {
@@ -220,12 +261,14 @@ class SqlPlaceStore final : public PlaceStore {
     });
   }
   Result<void> remove(const FloorId& id, std::uint64_t expected_version) override {
-    return write_void(gate_, [&](Connection& c) -> std::optional<Error> {
+    BOOST_OUTCOME_TRYV(write_void(gate_, [&](Connection& c) -> std::optional<Error> {
       Query query(c, k_floor_remove);
       query << id << expected_version;
       if (query.returned()) return std::nullopt;
       return stale(c, id, expected_version);
-    });
+    }));
+    delete_tiles_of_nobody();
+    return boost::outcome_v2::success();
   }
 
   Result<void> keep(const FloorId& floor, const StoredImage& image, std::string_view bytes) override {
@@ -245,10 +288,52 @@ class SqlPlaceStore final : public PlaceStore {
         Query query(c, k_part_insert);
         query << image.id << ordinal << std::as_bytes(std::span(part));
         if (query.returned()) return std::nullopt;
-        return make_error(Errc::conflict, "the floor was changed while its plan was sent: send it again");
+        return changed_meanwhile();
       }));
     }
     return boost::outcome_v2::success();
+  }
+  Result<void> keep(const FloorId& floor, const PlanTiles& tiles,
+                    std::span<const PlanTile> pictures) override {
+    BOOST_OUTCOME_TRYV(write_void(gate_, [&](Connection& c) -> std::optional<Error> {
+      if (!find_floor(c, floor)) return absent("floor", floor);
+      Query query(c, k_tiles_insert);
+      query << tiles.id << floor << tiles.n_levels << tiles.m_per_px << tiles.width_px << tiles.height_px
+            << tiles.west_m << tiles.north_m << tiles.bytes << tiles.sha256_hex;
+      query.run();
+      return std::nullopt;
+    }));
+    for (std::size_t at = 0; at < pictures.size();) {
+      std::size_t n = 0;
+      for (std::size_t bytes = 0; at + n < pictures.size() && n < k_tile_rows && bytes < k_tile_bytes; ++n)
+        bytes += pictures[at + n].png.size();
+      const auto some = pictures.subspan(at, n);
+      BOOST_OUTCOME_TRYV(write_void(gate_, [&](Connection& c) -> std::optional<Error> {
+        Query hold(c, k_tiles_hold);
+        hold << tiles.id << floor;
+        if (!hold.returned()) return changed_meanwhile();
+        (void)c.insert_rows({"plan_tile", "tiles_id, level, tile_column, tile_row, content"}, some.size(),
+                            [&](Query& query, std::size_t row) {
+                              const auto& tile = some[row];
+                              query << tiles.id << tile.level << tile.column << tile.row
+                                    << std::as_bytes(std::span(tile.png));
+                            });
+        return std::nullopt;
+      }));
+      at += n;
+    }
+    return boost::outcome_v2::success();
+  }
+  Result<std::optional<std::string>> tile(const PlanTilesId& tiles, int level, int column, int row) override {
+    return read_value<std::optional<std::string>>(
+        gate_, [&](Connection& c) -> Result<std::optional<std::string>> {
+          Query query(c, k_tile);
+          query << tiles << level << column << row;
+          if (!query.step()) return std::optional<std::string>();
+          const auto png = query.blob();
+          return std::optional<std::string>(std::in_place, reinterpret_cast<const char*>(png.data()),
+                                            png.size());
+        });
   }
   Result<std::string> bytes(const ImageId& image) override {
     return read_value<std::string>(gate_, [&](Connection& c) -> Result<std::string> {
@@ -270,6 +355,44 @@ class SqlPlaceStore final : public PlaceStore {
   }
 
  private:
+  static Error changed_meanwhile() {
+    return make_error(Errc::conflict, "the floor was changed while its plan was sent: send it again");
+  }
+  static std::optional<Error> change_tiles(Connection& c, const Floor& f) {
+    const PlanTilesId named = f.tiles ? f.tiles->id : PlanTilesId{};
+    if (f.tiles) {
+      Query name(c, k_tiles_name);
+      name << named << f.id;
+      if (!name.returned()) return absent("tiles", named);
+    }
+    Query forget(c, k_tiles_forget);
+    forget << f.id << named;
+    forget.run();
+    return std::nullopt;
+  }
+  /// In parts, so that measurements are committed between them. What a fault leaves goes with the next change
+  /// of any floor: the change that was asked for is done, and no reason to refuse it.
+  void delete_tiles_of_nobody() {
+    bool more = true;
+    while (more) {
+      const auto deleted = write_void(gate_, [&](Connection& c) -> std::optional<Error> {
+        Query nobody(c, k_tiles_of_nobody);
+        more = nobody.step();
+        if (!more) return std::nullopt;
+        const auto id = nobody.id<PlanTilesId>();
+        Query some(c, k_tiles_empty);
+        some << id << k_tiles_deleted;
+        int n = 0;
+        while (some.step()) ++n;
+        if (n == k_tiles_deleted) return std::nullopt;
+        Query whole(c, k_tiles_delete);
+        whole << id;
+        whole.run();
+        return std::nullopt;
+      });
+      if (!deleted) return;
+    }
+  }
   static Error stale(Connection& c, const BuildingId& id, std::uint64_t expected_version) {
     const auto stored = find_building(c, id);
     return stored ? moved_on("the building", expected_version, stored->version) : absent("building", id);

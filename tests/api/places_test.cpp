@@ -1,5 +1,6 @@
 // Buildings, floors and their plans over a real database; pictures are decoded and traced for real, on the
 // calling thread (tests/server/worker_process_test.cpp has the process).
+#include "api/places/plan_work.hpp"
 #include "app_fixture.hpp"
 #include "core/base/sha256.hpp"
 #include "core/floor_plan/image.hpp"
@@ -138,6 +139,10 @@ class BusyPlaces : public Places {
     deps.run_plan_work = [this](const std::string& message, const api::WorkProgressSink& progress,
                                 const std::function<bool()>& canceled) {
       if (auto meanwhile = std::exchange(meanwhile_, nullptr)) meanwhile();
+      if (message.find(R"("task":"tiles")") < message.find('\n')) {
+        if (refuse_tiles_) return Result<std::string>(api::too_busy(api::plan_work_cpu_s(message)));
+        if (say_of_tiles_) return Result<std::string>(*say_of_tiles_);
+      }
       return api::plan_work_inline(message, progress, canceled);
     };
   }
@@ -147,6 +152,8 @@ class BusyPlaces : public Places {
     return call(Method::put, floor + "/plan", room(), options);
   }
   std::function<void()> meanwhile_;
+  bool refuse_tiles_{false};
+  std::optional<std::string> say_of_tiles_;
 };
 
 TEST_F(BusyPlaces, ReadAPlanOfEachOfTwoTokensAtOnceAndRefuseMoreWithWhatToDo) {
@@ -241,6 +248,114 @@ TEST_F(Places, PlaceAPlanByClickedPointsAndServeItNorthUp) {
   ASSERT_TRUE(image.has_value());
   EXPECT_EQ(image.value().width_px, body["backdrop"]["width_px"]);
   EXPECT_NEAR(image.value().width_px, 800, 1);
+}
+
+TEST_F(Places, ServeAPlacedPlanInTilesOfEveryLevelAndSayWhereTheyAre) {
+  const auto f = floor();
+  ASSERT_EQ(put(f + "/plan", f, room(), "image/png").status, 201);
+  EXPECT_TRUE(json(get(f))["tiles"].is_null());
+  EXPECT_TRUE(json(get(f))["tiles_missing"].is_null()) << "nothing is missing of a plan that is not placed";
+  EXPECT_EQ(get(f + "/plan/tiles/0/0/0").status, 404);
+  const auto placed = put(f + "/plan/georeference", f, clicks().dump());
+  ASSERT_EQ(placed.status, 200) << placed.body;
+  const auto tiles = json(get(f))["tiles"];
+  EXPECT_EQ(json(placed)["tiles"], tiles);
+  EXPECT_EQ(tiles["tile_px"], 256);
+  EXPECT_NEAR(tiles["north_west_m"][0].get<double>(), 100, 1e-3);
+  EXPECT_NEAR(tiles["north_west_m"][1].get<double>(), 200, 1e-3);
+  EXPECT_EQ(tiles["origin"]["lat"], 51);
+  // 800 x 600 pixels of 2 cm: 4 x 3 tiles, of twice and four times that 2 x 2 and 1.
+  ASSERT_EQ(tiles["levels"].size(), 3u);
+  const int across[3][2] = {{1, 1}, {2, 2}, {4, 3}};
+  for (std::size_t level = 0; level < 3; ++level) {
+    EXPECT_EQ(tiles["levels"][level]["level"], level);
+    EXPECT_EQ(tiles["levels"][level]["columns"], across[level][0]);
+    EXPECT_EQ(tiles["levels"][level]["rows"], across[level][1]);
+    EXPECT_NEAR(tiles["levels"][level]["m_per_px"].get<double>(), 0.08 / (1 << level), 1e-6);
+  }
+  // The north-west corner of the wall, at (102, 198) m: pixel (100, 100) of the last level.
+  const auto tile = get(f + "/plan/tiles/2/0/0");
+  ASSERT_EQ(tile.status, 200) << tile.body;
+  EXPECT_EQ(header(tile, "Content-Type"), "image/png");
+  const auto image = floor_plan::decode_image(std::as_bytes(std::span(tile.body))).value();
+  ASSERT_EQ(image.width_px, 256);
+  const auto ink = [&](int x, int y) {
+    return image.pixels[static_cast<std::size_t>(3 * (y * 256 + x))] < 128;
+  };
+  EXPECT_TRUE(ink(102, 102));
+  EXPECT_FALSE(ink(97, 102));
+  EXPECT_FALSE(ink(102, 97));
+  const auto etag = header(tile, "ETag");
+  EXPECT_EQ(
+      call(Method::get, f + "/plan/tiles/2/3/2", "", as(Role::viewer, {{"if-none-match", etag}})).status,
+      304);
+  const auto outside = get(f + "/plan/tiles/2/4/0");
+  EXPECT_EQ(outside.status, 404);
+  EXPECT_NE(outside.body.find("level 2 of the plan has columns 0 to 3 and rows 0 to 2"), std::string::npos)
+      << outside.body;
+  const auto above = get(f + "/plan/tiles/3/0/0");
+  EXPECT_EQ(above.status, 404);
+  EXPECT_NE(above.body.find("levels 0 to 2"), std::string::npos) << above.body;
+  for (const char* none : {"2/-1/0", "2/0/x", "x/0/0", "2/0/99999999999"})
+    EXPECT_EQ(get(f + "/plan/tiles/" + none).status, 404) << none;
+  // A new plan takes them along.
+  ASSERT_EQ(put(f + "/plan", f, room(), "image/png").status, 200);
+  EXPECT_EQ(get(f + "/plan/tiles/2/0/0").status, 404);
+}
+
+TEST_F(Places, AnswerATileThatNothingOfThePlanLiesOnWithoutAPicture) {
+  const auto f = floor();
+  ASSERT_EQ(put(f + "/plan", f, room(), "image/png").status, 201);
+  // Turned by 45 degrees: 16 x 12 m become a square of 19.8 m on its corner.
+  const double c = 0.02 * std::sqrt(0.5);
+  Json points = Json::array();
+  for (const auto& [x, y] : std::vector<std::pair<int, int>>{{0, 0}, {800, 0}, {0, 600}})
+    points.push_back({{"pixel", {x, y}}, {"enu_m", {c * (x + y), c * (x - y)}}});
+  const auto placed = put(f + "/plan/georeference", f, Json{{"points", points}}.dump());
+  ASSERT_EQ(placed.status, 200) << placed.body;
+  EXPECT_EQ(get(f + "/plan/tiles/2/0/0").status, 204);
+  EXPECT_EQ(get(f + "/plan/tiles/2/1/1").status, 200);
+}
+
+TEST_F(BusyPlaces, KeepTheBackdropOfAPlanWhoseTilesCouldNotBeMadeAndSayWhy) {
+  const auto f = floor();
+  ASSERT_EQ(put(f + "/plan", f, room(), "image/png").status, 201);
+  refuse_tiles_ = true;
+  const auto placed = put(f + "/plan/georeference", f, clicks().dump());
+  ASSERT_EQ(placed.status, 200) << placed.body;
+  EXPECT_TRUE(json(get(f))["tiles"].is_null());
+  EXPECT_NE(json(get(f))["tiles_missing"].get<std::string>().find("more than 60 s of processor time"),
+            std::string::npos)
+      << get(f).body;
+  EXPECT_EQ(get(f + "/plan/backdrop").status, 200);
+  const auto none = get(f + "/plan/tiles/0/0/0");
+  EXPECT_EQ(none.status, 404);
+  EXPECT_NE(none.body.find("tiles_missing"), std::string::npos) << none.body;
+  refuse_tiles_ = false;
+  ASSERT_EQ(put(f + "/plan/georeference", f, clicks().dump()).status, 200);
+  EXPECT_TRUE(json(get(f))["tiles_missing"].is_null());
+  EXPECT_EQ(get(f + "/plan/tiles/0/0/0").status, 200);
+}
+
+TEST_F(BusyPlaces, TakeNothingOnTrustThatAWorkerSaysOfTiles) {
+  const auto f = floor();
+  ASSERT_EQ(put(f + "/plan", f, room(), "image/png").status, 201);
+  for (
+      const char* answer :
+      {"", "no JSON\n", "{}\n",
+       R"({"north_west_m":[0,0],"m_per_px":0.1,"width_px":10,"height_px":10,"n_levels":1,"tiles":[[0,0,0,99]]})"
+       "\nshort",
+       R"({"north_west_m":[0,0],"m_per_px":0.1,"width_px":10,"height_px":10,"n_levels":1,"tiles":[[0,0,0,3]]})"
+       "\nGIF",
+       R"({"north_west_m":[0,0],"m_per_px":0.1,"width_px":10,"height_px":10,"n_levels":60,"tiles":[]})"
+       "\n",
+       R"({"north_west_m":[0,0],"m_per_px":-1,"width_px":10,"height_px":10,"n_levels":1,"tiles":[]})"
+       "\n"}) {
+    say_of_tiles_ = answer;
+    ASSERT_EQ(put(f + "/plan/georeference", f, clicks().dump()).status, 200) << answer;
+    EXPECT_TRUE(json(get(f))["tiles"].is_null()) << answer;
+    EXPECT_EQ(json(get(f))["tiles_missing"], "the worker's answer cannot be read") << answer;
+  }
 }
 
 TEST_F(Places, NameThePointThatDoesNotFitTheOthers) {

@@ -1,4 +1,4 @@
-// The plan of a room as a PNG, made byte by byte: 800 x 600 pixels, walls of 15 pixels round (100, 100) to (700, 500).
+// Plans as PNGs, made byte by byte.
 import { crc32, deflateSync } from 'node:zlib';
 
 const chunk = (name, data) => {
@@ -9,23 +9,33 @@ const chunk = (name, data) => {
   sum.writeUInt32BE(crc32(body));
   return Buffer.concat([head, body, sum]);
 };
-export function room_png() {
-  const rows = [];
-  for (let y = 0; y < 600; y++) {
-    const row = Buffer.alloc(801, 255);
-    row[0] = 0; // no filter
-    if (y >= 100 && y < 500)
-      for (let x = 100; x < 700; x++) if (x < 115 || x >= 685 || y < 115 || y >= 485) row[1 + x] = 0;
-    rows.push(row);
-  }
+/** A PNG of 8 bits of grey whose head says so many pixels, and whose pixels are these bytes: a filter byte of 0 before each row. */
+export function png_of(width, height, pixels) {
   const head = Buffer.alloc(13);
-  head.writeUInt32BE(800, 0);
-  head.writeUInt32BE(600, 4);
-  head.set([8, 0, 0, 0, 0], 8); // 8 bits of grey
+  head.writeUInt32BE(width, 0);
+  head.writeUInt32BE(height, 4);
+  head.set([8, 0, 0, 0, 0], 8);
   return Buffer.concat([
     Buffer.from([0x89, 0x50, 0x4e, 0x47, 0x0d, 0x0a, 0x1a, 0x0a]),
     chunk('IHDR', head),
-    chunk('IDAT', deflateSync(Buffer.concat(rows))),
+    chunk('IDAT', deflateSync(pixels)),
     chunk('IEND', Buffer.alloc(0)),
   ]);
 }
+/** White paper with ink where `ink(x, y)` says so. */
+export function drawn_png(width, height, ink) {
+  const pixels = Buffer.alloc((width + 1) * height, 255);
+  for (let y = 0; y < height; y++) {
+    const row = y * (width + 1);
+    pixels[row] = 0; // no filter
+    for (let x = 0; x < width; x++) if (ink(x, y)) pixels[row + 1 + x] = 0;
+  }
+  return png_of(width, height, pixels);
+}
+/** The plan of a room: 800 x 600 pixels, walls of 15 pixels round (100, 100) to (700, 500). */
+export const room_png = () =>
+  drawn_png(
+    800,
+    600,
+    (x, y) => x >= 100 && x < 700 && y >= 100 && y < 500 && (x < 115 || x >= 685 || y < 115 || y >= 485),
+  );

@@ -144,6 +144,28 @@ TEST_F(WorkerProcess, DecodesThePictureOfAFloorPlan) {
   EXPECT_EQ(half.error().code, Errc::bad_frame);
 }
 
+TEST_F(WorkerProcess, GivesBackTheTilesOfAPlanByteForByte) {
+  const auto picture = floor_plan::tiff(false, false);
+  const std::string head = R"(floor_plan {"task":"tiles","enu_from_pixel":[1,0,0,0,-1,0]})";
+  const auto result = run("exec '" ANCHORD_BINARY "' worker", head + '\n' + picture);
+  ASSERT_TRUE(result) << result.error().message;
+  const auto& text = result.value();
+  const auto line_end = text.find('\n');
+  const auto told = nlohmann::json::parse(text.substr(0, line_end));
+  ASSERT_EQ(told["tiles"].size(), 1u);
+  const auto png = text.substr(line_end + 1);
+  EXPECT_EQ(told["tiles"][0], (nlohmann::json{0, 0, 0, png.size()}));
+  const auto tile = floor_plan::decode_image(std::as_bytes(std::span(png)));
+  ASSERT_TRUE(tile) << tile.error().message;
+  EXPECT_EQ(tile.value().pixels[3], 0x40) << "as in the picture";
+}
+
+TEST_F(WorkerProcess, WhatDiesBetweenItsLastWordAndItsResultHasNone) {
+  const auto result = says(R"({"op":"done"})");
+  ASSERT_FALSE(result);
+  EXPECT_EQ(result.error().code, Errc::link_lost) << result.error().message;
+}
+
 /// A PDF 1.4 by hand; object 1 is its catalogue.
 std::string pdf_of(const std::vector<std::string>& objects, const std::string& trailer = {}) {
   std::string out = "%PDF-1.4\n", table;

@@ -57,7 +57,8 @@ TEST_F(Migrate, FindsEveryLandedMigrationAsItWas) {
             "9 7c4ffeb6bd9e4aeb1810a60170fbca4d00fb10c4e5046f130dc0dc47fbdbec15\n"
             "10 098b135dddac37d59e25a60e4ca32042085fe09793cd02a168a2db795eed8968\n"
             "11 fb46c23aed9b18c6fb8d78f4b993f62c7c9955ea2d2f7ce173a314072fd736a2\n"
-            "12 772f473e05d3ce7c38825e4939476ca713a0069c8b4555c9abcce6f130781942\n");
+            "12 772f473e05d3ce7c38825e4939476ca713a0069c8b4555c9abcce6f130781942\n"
+            "13 845d3d59444816e9878b0455545bdeeba14f292f9fcd6ca1591df6771568df0c\n");
 }
 
 TEST_F(Migrate, KnowsTheDigestOfAPublishedVector) {

@@ -129,6 +129,69 @@ TEST_P(PlaceStoreContract, KeepsPicturesByteForByteAndForgetsThoseNobodyNames) {
   EXPECT_EQ(places().bytes(floor.plan->id).error().code, Errc::not_found);
 }
 
+/// A pyramid of `n` rows of one tile each on its only level, and a picture of its own for each.
+struct Pyramid {
+  PlanTiles tiles{PlanTilesId{make_uuid_v7(k_noon)}, 2, 0.025, 700, 900, -3.5, 81.25, 12, "sum"};
+  std::vector<std::string> pngs;
+  std::vector<PlanTile> pictures() const {
+    std::vector<PlanTile> out;
+    for (const auto& png : pngs) out.push_back({1, 0, static_cast<int>(out.size()), png});
+    return out;
+  }
+  explicit Pyramid(int n) {
+    for (int i = 0; i < n; ++i) pngs.push_back(std::string(1, '\0') + "png " + std::to_string(i));
+  }
+};
+
+TEST_P(PlaceStoreContract, KeepsTheTilesOfAPlanAndGivesEachBackByItsPlace) {
+  auto floor = stored_floor(stored_building());
+  const Pyramid made(700);  // more than one transaction writes
+  ASSERT_TRUE(places().keep(floor.id, made.tiles, made.pictures()));
+  EXPECT_FALSE(places().floor(floor.id).value().tiles) << "nobody named them yet";
+  floor.tiles = made.tiles;
+  ASSERT_TRUE(places().update(floor, 1));
+  const auto found = places().floors(10, {}, {}).value().at(0).tiles;
+  ASSERT_TRUE(found);
+  EXPECT_EQ(found->id, made.tiles.id);
+  EXPECT_EQ(found->n_levels, 2);
+  EXPECT_EQ(found->m_per_px, 0.025);
+  EXPECT_EQ(found->width_px, 700);
+  EXPECT_EQ(found->height_px, 900);
+  EXPECT_EQ(found->west_m, -3.5);
+  EXPECT_EQ(found->north_m, 81.25);
+  EXPECT_EQ(found->bytes, 12);
+  EXPECT_EQ(found->sha256_hex, "sum");
+  for (const int row : {0, 255, 256, 699})
+    EXPECT_EQ(places().tile(made.tiles.id, 1, 0, row).value(), made.pngs[static_cast<std::size_t>(row)]);
+  EXPECT_FALSE(places().tile(made.tiles.id, 1, 0, 700).value());
+  EXPECT_FALSE(places().tile(made.tiles.id, 0, 0, 0).value());
+}
+
+TEST_P(PlaceStoreContract, ForgetsTilesWithTheirPlanAndWithTheirFloor) {
+  auto floor = stored_floor(stored_building());
+  auto other = stored_floor(stored_building());
+  const Pyramid first(300), second(2), others(1);
+  for (auto* one : {&floor, &other}) {
+    const auto& made = one == &floor ? first : others;
+    ASSERT_TRUE(places().keep(one->id, made.tiles, made.pictures()));
+    one->tiles = made.tiles;
+    ASSERT_TRUE(places().update(*one, 1));
+  }
+  ASSERT_TRUE(places().keep(floor.id, second.tiles, second.pictures()));
+  floor.tiles = second.tiles;
+  ASSERT_TRUE(places().update(floor, 2));
+  for (const int row : {0, 299}) EXPECT_FALSE(places().tile(first.tiles.id, 1, 0, row).value());
+  EXPECT_TRUE(places().tile(second.tiles.id, 1, 0, 1).value());
+  // A floor that was changed meanwhile keeps no more tiles of those that it does not name.
+  EXPECT_EQ(places().keep(floor.id, first.tiles, first.pictures()).has_value(), true);
+  ASSERT_TRUE(places().update(floor, 3));
+  floor.tiles = first.tiles;
+  EXPECT_EQ(places().update(floor, 4).error().code, Errc::not_found);
+  ASSERT_TRUE(places().remove(floor.id, 4));
+  EXPECT_FALSE(places().tile(second.tiles.id, 1, 0, 1).value());
+  EXPECT_TRUE(places().tile(others.tiles.id, 1, 0, 0).value()) << "another floor's stay";
+}
+
 INSTANTIATE_TEST_SUITE_P(Backends, PlaceStoreContract, backends(), backend_name);
 
 }  // namespace

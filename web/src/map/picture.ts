@@ -20,6 +20,7 @@ import {
   type Box,
   type Ctx,
 } from './symbols';
+import { draw_tiles } from './tiles';
 
 export interface Content {
   readonly anchors: readonly EstimateMsg[];
@@ -75,7 +76,7 @@ export function draw_backdrop(c: Ctx, cam: Camera, b: Backdrop): void {
     [right, top] = to_px(cam, b.high);
   c.save();
   c.globalAlpha = 0.5;
-  c.drawImage(b.image, left, top, right - left, bottom - top);
+  if (!draw_tiles(c, cam, b)) c.drawImage(b.image, left, top, right - left, bottom - top);
   c.restore();
 }
 /// Symbols and labels, above the ranges: a line must never strike out a name. `covered`: by buttons and scales over the map.

@@ -7,6 +7,7 @@ import { enu_from_geodetic, geodetic_from_enu, type Geodetic } from '../map/enu'
 export type Floor = Wire<'Floor'>;
 /// A picture that is north up, by its corners in metres about the origin of the map.
 export interface Backdrop {
+  readonly floor: Floor;
   readonly image: HTMLImageElement;
   readonly low: readonly [number, number];
   readonly high: readonly [number, number];
@@ -100,6 +101,6 @@ export function backdrops(origin: Geodetic | null | undefined): readonly Backdro
     .filter((f) => f.level === level)
     .flatMap((f) => {
       const image = picture(f);
-      return image ? [{ image, ...corners_about(f.backdrop!, origin) }] : [];
+      return image ? [{ floor: f, image, ...corners_about(f.backdrop!, origin) }] : [];
     });
 }
