@@ -276,6 +276,13 @@ test('start is blocked until the checklist is green; then the aircraft flies, ho
     { anchors, provenance } = await get(`/api/v1/calibrations/${made}`);
   for (const { network_id } of anchors) assert.ok(await report.getByText(network_id).count(), network_id);
   assert.ok(provenance.n_clues > 0, 'what the turn and the height search told went into it');
+  // One limit for "accurate enough": the target of the plan that was flown, in the calibration, the report and the review.
+  for (const { network_id, goal, quality } of anchors) {
+    assert.equal(goal.source, 'plan_target', network_id);
+    const row = await text(id('draft').locator('tbody tr', { hasText: network_id }));
+    assert.equal(row.includes(`over the ${goal.words}`), quality.acceptable && !goal.reached, row);
+  }
+  assert.ok(await report.getByText(anchors[0].goal.words, { exact: true }).count(), 'the report names the goal');
   await picture(report, 'report-light');
   // It fits the page to print on, and a phone.
   const widest = () =>
