@@ -204,6 +204,7 @@ Application::State::State(Deps d)
           audit} {
   missions.observe(&flights);
   mission_api.flight = flight_actions(flight_api);
+  mission_api.flight_time = [this](const MissionId& id) { return flown_time_json(flights.flown_time(id)); };
   anchor_api.goals = {deps.goal, [this](const MissionId& id) { return flights.targets(id); }};
   calibration_api.goals = anchor_api.goals;
   anchor_api.answers = &anchor_answers;

@@ -82,7 +82,7 @@ flight::FlownChanges changes_of(const nlohmann::json& j) {
 }
 
 KeptOutcome outcome_of(const flight::ActiveFlight& f) {
-  return {f.priors(), targets_of(f.plan)};
+  return {f.priors(), targets_of(f.plan), f.flown_time()};
 }
 
 nlohmann::ordered_json document_of(const flight::ActiveFlight& f) {
@@ -97,6 +97,7 @@ nlohmann::ordered_json document_of(const flight::ActiveFlight& f) {
           {"home_m", {f.home_m.x(), f.home_m.y(), f.home_m.z()}},
           {"changes", changes_json(f.changes)},
           {"targets", stored_targets(targets_of(f.plan))},
+          {"forecast_at_start", forecast_json(f.forecast_at_start)},
           {"state", stored_state(f.control.engine().state())},
           {"clues", stored_priors(f.priors())}};
 }
@@ -120,6 +121,7 @@ std::optional<flight::KeptFlight> kept_flight(const MissionId& mission, const nl
   out.manual = j.value("manual", false);
   out.aircraft = aircraft_of(j.value("aircraft", nlohmann::json()));
   out.changes = changes_of(j.value("changes", nlohmann::json()));
+  out.forecast_at_start = forecast_of(j.value("forecast_at_start", nlohmann::json()));
   out.priors = priors_of(j.value("clues", nlohmann::json()));
   return out;
 }
@@ -133,7 +135,7 @@ bool FlightService::State::to_keep(Work& w, std::string& text) {
                  k_change * (f->changes.n + f->changes.saved_revision + f->changes.n_anchor_orders);
   if (n == w.last.kept) return false;
   w.last.kept = n;
-  // What it found and what was wanted outlive the flight: its calibrations ask for them.
+  // What it found, what was wanted and how long it took outlive the flight: its calibrations ask for them.
   text = to_wire(f->flying() ? document_of(*f) : stored_outcome(outcome_of(*f)));
   return true;
 }
@@ -150,6 +152,10 @@ Part FlightService::State::outcome(const MissionId& mission, Part KeptOutcome::*
 
 PlanTargets FlightService::targets(const MissionId& mission) {
   return state_->outcome(mission, &KeptOutcome::targets);
+}
+
+std::optional<flight::FlownTime> FlightService::flown_time(const MissionId& mission) {
+  return state_->outcome(mission, &KeptOutcome::time);
 }
 
 /// A disk that is slow or full makes no flight wait: what is written last is what a restart finds.

@@ -164,6 +164,7 @@ TEST_F(MissionLive, HoldsAnAnchorAgainstTheTargetOfItsFlownPlanAndNotAgainstTheS
     EXPECT_EQ(properties["goal"]["source"], own ? "anchor_target" : "site") << anchor;
     EXPECT_EQ(properties["quality"]["gates"].back()["name"], own ? "target_sigma_m" : "goal_v95_m") << anchor;
   }
+  EXPECT_EQ(json(get("/api/v1/missions/" + id))["flight_time"], nullptr);
   close();
 }
 

@@ -23,6 +23,7 @@
 #include "api/webhooks/cloud_event.hpp"
 #include "core/flight/command.hpp"
 #include "core/flight/control_lease.hpp"
+#include "core/flight/flown_time.hpp"
 #include "core/floor_plan/georeference.hpp"
 #include "core/floor_plan/image_head.hpp"
 #include "core/localize/accuracy_goal.hpp"
@@ -226,6 +227,7 @@ TEST(WireWords, AreThoseOfOpenApi) {
       {"MissionCreate.track_point", words(k_point_words)},
       {"Mission.track_point", words(k_point_words)},
       {"Mission.state", words(k_mission_state_words)},
+      {"FlightTime.against_forecast", words(flight::k_against_forecast_words)},
       {"AnchorGoal.source", words(k_goal_source_words)},
       {"MissionAction.action", words({"finish", "take_devices"}, flight::k_flight_action_words)},
       {"MissionAction.mode", words(flight::k_flight_mode_words)},

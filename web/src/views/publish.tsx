@@ -30,6 +30,7 @@ import { publish_open } from './dialogs';
 import { plan_again } from './plan_again';
 import { draft_key } from './plan/draft';
 import { ReviewAnchor } from './review_anchor';
+import { FlightTime } from './flight/flight_time';
 import { flying } from './flight/words';
 import { LeverArmSigma } from './lever_arm_sigma';
 
@@ -146,6 +147,7 @@ export function Publish({ mission }: { mission: MissionMsg }) {
         )}{' '}
         What is published is what facility tools read; the running estimates are not.
       </p>
+      <FlightTime mission={mission.mission} />
       {solves && unseen > 0 && <LeverArmSigma withheld={unseen} busy={busy !== ''} solve={solve_again} />}
       {busy === 'calibrating' && <p role="status">Solving {mission.n_ranges} ranges.</p>}
       {problem && (
