@@ -26,6 +26,7 @@ import { sentence, Stage } from '../flight/procedure';
 import { STATUS_LOOK } from '../flight/words';
 import { RangeList } from '../range_list';
 import { not_loaded_words } from '../../ui/empty';
+import { Unknown } from '../../ui/unknown';
 import { useStable } from '../../ui/use_stable';
 
 const SPEEDS = [0.25, 0.5, 1, 2, 4, 8, 16] as const;
@@ -157,11 +158,15 @@ export function Replay({ id }: { id: string | null }) {
   if (!mission)
     return (
       <div class="empty">
-        <p role="status">
-          {synced.value && link.value !== 'lost'
-            ? 'No flight is stored under this address.'
-            : not_loaded_words(link.value)}
-        </p>
+        {!synced.value || link.value === 'lost' ? (
+          <p role="status">{not_loaded_words(link.value)}</p>
+        ) : wanted ? (
+          <Unknown what="flight" id={wanted}>
+            or choose a flight in System.
+          </Unknown>
+        ) : (
+          <p role="status">No flight is stored here yet.</p>
+        )}
         <a class="btn" href="#/live">
           Go to Live
         </a>
