@@ -7,7 +7,7 @@
 #include "api/calibration/revision_news.hpp"
 #include "api/devices/device_json.hpp"
 #include "api/exchange/anchor_files.hpp"
-#include "api/flight/kept_priors.hpp"
+#include "api/flight/kept_outcome.hpp"
 #include "api/flight/procedure_json.hpp"
 #include "api/mqtt/mqtt_status.hpp"
 #include "core/base/ed25519.hpp"
@@ -34,25 +34,27 @@ Application::State::State(Deps d)
       alarms(events),
       signer(ModelSigner::parse_seed(deps.model_key).value()),
       models(ModelSource(stores.models, signer)),
-      missions({.missions = stores.missions,
-                .measurements = stores.measurements,
-                .sites = stores.sites,
-                .anchors = stores.anchors,
-                .hub = hub,
-                .events = events,
-                .clock = deps.clock,
-                .steady = steady,
-                .live = deps.work.live,
-                .joint = deps.work.joint,
-                .late = late,
-                .exclusions = stores.exclusions,
-                .goal = deps.goal,
-                .device_rows = [this] { return device_rows(); },
-                .predict = [this](const Range& range) { return predict_range(*models.active(), range); },
-                .predict_needs_cir = [this] { return models.active()->needs_cir; },
-                .site_outline = deps.site_outline,
-                .track = deps.track,
-                .kept_priors = [this](const MissionId& id) { return kept_priors(stores.plans, id); }}),
+      missions(
+          {.missions = stores.missions,
+           .measurements = stores.measurements,
+           .sites = stores.sites,
+           .anchors = stores.anchors,
+           .hub = hub,
+           .events = events,
+           .clock = deps.clock,
+           .steady = steady,
+           .live = deps.work.live,
+           .joint = deps.work.joint,
+           .late = late,
+           .exclusions = stores.exclusions,
+           .goal = deps.goal,
+           .device_rows = [this] { return device_rows(); },
+           .predict = [this](const Range& range) { return predict_range(*models.active(), range); },
+           .predict_needs_cir = [this] { return models.active()->needs_cir; },
+           .site_outline = deps.site_outline,
+           .track = deps.track,
+           .kept_priors = [this](const MissionId& id) { return kept_outcome(stores.plans, id).priors; },
+           .kept_targets = [this](const MissionId& id) { return kept_outcome(stores.plans, id).targets; }}),
       structures(stores.places),
       flights({.missions = missions,
                .plans = stores.plans,
@@ -76,19 +78,20 @@ Application::State::State(Deps d)
       geo(deps.geoid_dir),
       contradictions({stores.anchors, stores.calibrations, stores.revisions, stores.missions, events}),
       profiles(stores.kits, stores.missions, deps.clock),
-      calibrations({.measurements = stores.measurements,
-                    .missions = stores.missions,
-                    .sites = stores.sites,
-                    .calibrations = stores.calibrations,
-                    .jobs = jobs,
-                    .clock = deps.clock,
-                    .profiles = profiles,
-                    .models = models,
-                    .flight_priors = [this](const MissionId& id) { return kept_priors(stores.plans, id); },
-                    .frames = stores.frames,
-                    .exclusions = stores.exclusions,
-                    .track = deps.track,
-                    .contradictions = contradictions}),
+      calibrations(
+          {.measurements = stores.measurements,
+           .missions = stores.missions,
+           .sites = stores.sites,
+           .calibrations = stores.calibrations,
+           .jobs = jobs,
+           .clock = deps.clock,
+           .profiles = profiles,
+           .models = models,
+           .flight_priors = [this](const MissionId& id) { return kept_outcome(stores.plans, id).priors; },
+           .frames = stores.frames,
+           .exclusions = stores.exclusions,
+           .track = deps.track,
+           .contradictions = contradictions}),
       training({stores.datasets, stores.training_runs, jobs, events, deps.clock, deps.run_work,
                 deps.build.version, signer}),
       omlox_locations(hub, stores.missions),
@@ -201,6 +204,9 @@ Application::State::State(Deps d)
           audit} {
   missions.observe(&flights);
   mission_api.flight = flight_actions(flight_api);
+  mission_api.flight_time = [this](const MissionId& id) { return flown_time_json(flights.flown_time(id)); };
+  anchor_api.goals = {deps.goal, [this](const MissionId& id) { return flights.targets(id); }};
+  calibration_api.goals = anchor_api.goals;
   anchor_api.answers = &anchor_answers;
   anchor_api.file = [this](std::string_view format, const Request& request) {
     return anchor_file(exchange_api, format, request);

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "api/anchors/anchor_goals.hpp"
 #include "api/formats/csv_text.hpp"
 #include "api/kit/or_null.hpp"
 #include "api/wire/live_writer.hpp"
@@ -199,6 +200,7 @@ Ordered anchor_feature_json(const AnchorFeature& feature) {
   p["accuracy"] =
       estimate ? accuracy(*estimate, feature.frame, feature.site, feature.globe) : Ordered(nullptr);
   p["quality"] = estimate ? quality(*estimate, feature.overridden) : Ordered(nullptr);
+  p["goal"] = estimate && feature.goal ? anchor_goal_json(*feature.goal, *estimate) : Ordered(nullptr);
   p["budget"] = feature.budget_json.empty() ? Ordered(nullptr) : Ordered::parse(feature.budget_json);
   p["provenance"] = {
       {"calibration", feature.calibration ? Ordered(to_string(*feature.calibration)) : Ordered(nullptr)},

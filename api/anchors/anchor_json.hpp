@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "core/localize/accuracy_goal.hpp"
 #include "core/types/anchor.hpp"
 #include "core/types/estimate.hpp"
 #include "core/types/mission.hpp"
@@ -40,6 +41,7 @@ struct AnchorFeature {
   std::vector<MissionId> missions;
   TrackFrame frame{TrackFrame::wgs84};
   std::optional<Estimate> estimate{};
+  std::optional<AnchorGoal> goal{};  ///< that its accuracy is held against
   std::optional<Site> site{};
   std::optional<Override> overridden{};
   std::optional<GlobeAccuracy> globe{};      ///< of a place a fitted frame gave

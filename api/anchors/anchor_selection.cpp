@@ -21,10 +21,12 @@ std::vector<AnchorFeature> live(AnchorApi& s, const std::optional<MissionId>& mi
   FeatureLookup lookup(s);
   std::map<NetworkId, AnchorFeature> newest;
   for (const auto& view : s.missions.live(mission)) {
+    const auto flown = s.goals.flown({view.mission.id});
     for (const auto& estimate : view.estimates) {
       auto& feature = newest[estimate.anchor];
       if (feature.estimate && estimate.time < feature.estimate->time) continue;
       feature.estimate = estimate;
+      feature.goal = s.goals.of(estimate.anchor, flown);
       feature.frame = view.mission.frame;
       feature.missions = {view.mission.id};
       feature.calibrated = estimate.time;

@@ -33,6 +33,9 @@ struct FeatureLookup::State {
     }
     return it->second;
   }
+  AnchorGoal goal(const PublishedPosition& position) {
+    return services_.goals.of(position.estimate.anchor, calibration(position.calibration).flown);
+  }
   const std::vector<MissionId>& missions(const CalibrationId& id) { return calibration(id).missions; }
   /// Of a published place that a fitted frame gave.
   std::optional<GlobeAccuracy> globe(const PublishedPosition& position) {
@@ -79,13 +82,15 @@ struct FeatureLookup::State {
 
   struct Made {
     std::vector<MissionId> missions;
+    std::vector<PlanTargets> flown;
     Ordered provenance;
   };
   const Made& calibration(const CalibrationId& id) {
     auto [it, fresh] = calibrations_.try_emplace(id);
     if (fresh) {
       if (auto found = services_.calibrations.calibration(id))
-        it->second = {found.value().missions, Ordered::parse(found.value().provenance.text, nullptr, false)};
+        it->second = {found.value().missions, services_.goals.flown(found.value().missions),
+                      Ordered::parse(found.value().provenance.text, nullptr, false)};
     }
     return it->second;
   }
@@ -116,6 +121,7 @@ AnchorFeature FeatureLookup::feature(Anchor anchor, const PublishedPosition& pos
   feature.missions = state_->missions(position.calibration);
   feature.frame = position.frame;
   feature.estimate = position.estimate;
+  feature.goal = state_->goal(position);
   feature.overridden = position.overridden;
   feature.globe = state_->globe(position);
   feature.budget_json = state_->budget(position);

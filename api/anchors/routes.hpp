@@ -3,6 +3,7 @@
 #include <functional>
 #include <string_view>
 
+#include "api/anchors/anchor_goals.hpp"
 #include "api/kit/audit.hpp"
 #include "api/kit/message.hpp"
 
@@ -39,6 +40,7 @@ struct AnchorApi {
   /// given by api/exchange.
   std::function<Response(std::string_view format, const Request&)> file{};
   AnchorAnswers* answers{nullptr};  ///< where those of single anchors are kept; null: nowhere
+  AnchorGoals goals{};
 };
 
 void add_anchor_routes(Router& router, AnchorApi& api);

@@ -10,7 +10,7 @@ namespace anchord::api {
 
 using Ordered = nlohmann::ordered_json;
 
-Ordered calibration_json(const Calibration& calibration, bool with_anchors) {
+Ordered calibration_json(const Calibration& calibration, const AnchorGoals* goals) {
   Ordered missions = Ordered::array();
   for (const auto& id : calibration.missions) missions.push_back(to_string(id));
   Ordered out{{"id", to_string(calibration.id)},
@@ -22,7 +22,8 @@ Ordered calibration_json(const Calibration& calibration, bool with_anchors) {
   out["settings"] = settings.is_discarded() ? Ordered::object() : std::move(settings);
   auto provenance = Ordered::parse(calibration.provenance.text, nullptr, false);
   out["provenance"] = provenance.is_object() ? std::move(provenance) : Ordered::object();
-  if (!with_anchors) return out;
+  if (goals == nullptr) return out;
+  const auto flown = goals->flown(calibration.missions);
   Ordered anchors = Ordered::array();
   for (const auto& estimate : calibration.anchors) {
     anchors.push_back(estimate_result_json(estimate, calibration.frame, std::nullopt, std::nullopt,
@@ -30,6 +31,7 @@ Ordered calibration_json(const Calibration& calibration, bool with_anchors) {
     // Told in a local frame too, where the calibration asked for one.
     const auto local = Ordered::json_pointer("/frame/anchors/" + to_string(estimate.anchor));
     if (out["provenance"].contains(local)) anchors.back()["local_m"] = out["provenance"][local];
+    anchors.back()["goal"] = anchor_goal_json(goals->of(estimate.anchor, flown), estimate);
     anchors.back()["budget"] = kept_budget(out["provenance"], estimate.anchor);
   }
   out["anchors"] = std::move(anchors);

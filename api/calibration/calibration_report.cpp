@@ -134,6 +134,18 @@ void describe(Report& report, const std::vector<Mission>& missions, const std::s
       std::ranges::count_if(report.anchors, [](const ReportAnchor& a) { return a.estimate.acceptable(); }));
   report.remarks.push_back(std::to_string(good) + " of " + std::to_string(report.anchors.size()) +
                            " anchors pass every acceptance gate.");
+  std::size_t asked = 0;
+  std::string over;
+  for (const auto& anchor : report.anchors) {
+    if (!anchor.goal || !anchor.estimate.best) continue;
+    ++asked;
+    if (!within(*anchor.goal, anchor.estimate))
+      over += (over.empty() ? "" : ", ") +
+              (anchor.name.empty() ? to_string(anchor.estimate.anchor) : anchor.name);
+  }
+  if (asked > 0)
+    report.remarks.push_back(over.empty() ? "Every position is within its accuracy goal."
+                                          : "Over the accuracy goal, which is overleaf: " + over + ".");
   for (const auto& anchor : report.anchors) {
     if (!anchor.estimate.mirror) continue;
     report.remarks.push_back(
@@ -189,10 +201,12 @@ Result<Report> calibration_report(CalibrationApi& api, const Calibration& calibr
     }
   }
   const auto told = nlohmann::ordered_json::parse(calibration.provenance.text, nullptr, false);
+  const auto flown = api.goals.flown(calibration.missions);
   for (const auto& estimate : calibration.anchors) {
     ReportAnchor anchor;
     anchor.budget = report_budget(kept_budget(told, estimate.anchor));
     anchor.estimate = estimate;
+    anchor.goal = api.goals.of(estimate.anchor, flown);
     if (const auto known = api.anchors.anchor(estimate.anchor)) {
       anchor.name = known.value().name;
       anchor.place = place_of(known.value());

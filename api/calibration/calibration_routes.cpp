@@ -44,7 +44,7 @@ void ask_whether_moved(CalibrationApi& s, Calibration& calibration);
 Ordered whole(CalibrationApi& s, const Calibration& calibration) {
   Calibration today = calibration;
   ask_whether_moved(s, today);
-  Ordered body = calibration_json(today, true);
+  Ordered body = calibration_json(today, &s.goals);
   body["published"] = published_in(s, calibration.id);
   return body;
 }
@@ -57,7 +57,7 @@ Response list(CalibrationApi& s, const Request& request) {
         return s.calibration_store.calibrations(limit, after);
       },
       [](const Calibration& calibration) {
-        Ordered item = calibration_json(calibration, false);
+        Ordered item = calibration_json(calibration, nullptr);
         std::map<std::string, int> verdicts;
         for (const auto& estimate : calibration.anchors)
           ++verdicts[std::string(k_verdict_words.word(estimate.verdict))];
@@ -266,12 +266,19 @@ Response publish(CalibrationApi& s, const Request& request) {
   for (const auto& id : anchors) value_or_problem(s.anchors.find_or_create(id, s.clock.now()));
   announce_revision(s, revision, anchors.size(), overrides.size());
   Ordered answer = revision_json(revision);
-  Ordered taken = Ordered::array(), left = Ordered::array(), overridden = Ordered::array();
+  Ordered taken = Ordered::array(), left = Ordered::array(), overridden = Ordered::array(),
+          over = Ordered::array();
+  const auto flown = s.goals.flown(calibration.missions);
   for (const auto& id : anchors) taken.push_back(to_string(id));
   for (const auto& one : overrides)
     overridden.push_back({{"network_id", to_string(one.anchor)}, {"reason", one.reason}});
   for (const auto& estimate : calibration.anchors) {
-    if (std::find(anchors.begin(), anchors.end(), estimate.anchor) != anchors.end()) continue;
+    if (std::find(anchors.begin(), anchors.end(), estimate.anchor) != anchors.end()) {
+      if (const auto goal = s.goals.of(estimate.anchor, flown); !within(goal, estimate))
+        over.push_back(
+            {{"network_id", to_string(estimate.anchor)}, {"goal", anchor_goal_json(goal, estimate)}});
+      continue;
+    }
     Ordered gates = Ordered::array();
     for (const auto& gate : failures(estimate)) gates.push_back(gate_json(gate));
     left.push_back({{"network_id", to_string(estimate.anchor)},
@@ -282,6 +289,7 @@ Response publish(CalibrationApi& s, const Request& request) {
   answer["anchors"] = std::move(taken);
   answer["overrides"] = std::move(overridden);
   answer["left_out"] = std::move(left);
+  answer["over_goal"] = std::move(over);
   Response response = json_response(201, answer);
   response.header("Location", "/api/v1/anchors?revision=" + std::to_string(revision.number));
   return response;

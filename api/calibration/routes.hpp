@@ -2,6 +2,7 @@
 
 #include <string>
 
+#include "api/anchors/anchor_goals.hpp"
 #include "api/kit/audit.hpp"
 
 namespace anchord {
@@ -41,6 +42,7 @@ struct CalibrationApi {
   const Clock& clock;
   Audit audit;
   std::string program;  ///< "anchord 0.2.0", for reports
+  AnchorGoals goals{};
 };
 
 void add_calibration_routes(Router& router, CalibrationApi& api);

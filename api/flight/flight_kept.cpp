@@ -3,6 +3,7 @@
 
 #include "api/admin/event_log.hpp"
 #include "api/flight/flight_state.hpp"
+#include "api/flight/kept_outcome.hpp"
 #include "api/flight/procedure_json.hpp"
 #include "api/kit/late_writer.hpp"
 #include "api/planning/site_structures.hpp"
@@ -80,6 +81,10 @@ flight::FlownChanges changes_of(const nlohmann::json& j) {
   return out;
 }
 
+KeptOutcome outcome_of(const flight::ActiveFlight& f) {
+  return {f.priors(), targets_of(f.plan), f.flown_time()};
+}
+
 nlohmann::ordered_json document_of(const flight::ActiveFlight& f) {
   const auto& o = f.frame.origin();
   const auto& a = f.aircraft;
@@ -91,6 +96,8 @@ nlohmann::ordered_json document_of(const flight::ActiveFlight& f) {
           {"origin", {o.lat_deg, o.lon_deg, o.height_m}},
           {"home_m", {f.home_m.x(), f.home_m.y(), f.home_m.z()}},
           {"changes", changes_json(f.changes)},
+          {"targets", stored_targets(targets_of(f.plan))},
+          {"forecast_at_start", forecast_json(f.forecast_at_start)},
           {"state", stored_state(f.control.engine().state())},
           {"clues", stored_priors(f.priors())}};
 }
@@ -114,6 +121,7 @@ std::optional<flight::KeptFlight> kept_flight(const MissionId& mission, const nl
   out.manual = j.value("manual", false);
   out.aircraft = aircraft_of(j.value("aircraft", nlohmann::json()));
   out.changes = changes_of(j.value("changes", nlohmann::json()));
+  out.forecast_at_start = forecast_of(j.value("forecast_at_start", nlohmann::json()));
   out.priors = priors_of(j.value("clues", nlohmann::json()));
   return out;
 }
@@ -127,14 +135,27 @@ bool FlightService::State::to_keep(Work& w, std::string& text) {
                  k_change * (f->changes.n + f->changes.saved_revision + f->changes.n_anchor_orders);
   if (n == w.last.kept) return false;
   w.last.kept = n;
-  text.clear();
-  if (f->flying()) {
-    text = to_wire(document_of(*f));
-  } else if (const auto found = stored_priors(f->priors()); !found.empty()) {
-    // What turns and height searches found outlives the flight: every calibration of it asks for it.
-    text = to_wire(nlohmann::ordered_json{{"landed", true}, {"clues", found}});
-  }
+  // What it found, what was wanted and how long it took outlive the flight: its calibrations ask for them.
+  text = to_wire(f->flying() ? document_of(*f) : stored_outcome(outcome_of(*f)));
   return true;
+}
+
+/// In memory before the disk has it.
+template <class Part>
+Part FlightService::State::outcome(const MissionId& mission, Part KeptOutcome::*part) {
+  {
+    const auto w = work.lock();
+    if (const auto* f = w->operations.flight_of(mission)) return outcome_of(*f).*part;
+  }
+  return kept_outcome(deps.plans, mission).*part;
+}
+
+PlanTargets FlightService::targets(const MissionId& mission) {
+  return state_->outcome(mission, &KeptOutcome::targets);
+}
+
+std::optional<flight::FlownTime> FlightService::flown_time(const MissionId& mission) {
+  return state_->outcome(mission, &KeptOutcome::time);
 }
 
 /// A disk that is slow or full makes no flight wait: what is written last is what a restart finds.

@@ -6,6 +6,7 @@
 
 #include "api/admin/event_log.hpp"
 #include "api/flight/flight_state.hpp"
+#include "api/flight/kept_outcome.hpp"
 #include "api/planning/site_structures.hpp"
 #include "core/localize/live_flight.hpp"
 #include "core/ports/drone.hpp"
@@ -126,6 +127,7 @@ void FlightService::step() {
   std::string keep;
   bool keeps = false;
   std::optional<procedure::FlightPriors> priors;
+  std::optional<PlanTargets> targets;
   bool due_apart = false;
   {
     auto w = s.work.lock();
@@ -146,11 +148,16 @@ void FlightService::step() {
         w->last.priors_passed = version;
         priors = f->priors();
       }
+      if (const auto n = f->changes.n; w->last.targets_passed != n) {
+        w->last.targets_passed = n;
+        targets = targets_of(f->plan);
+      }
     }
     s.publish(*w);
     due_apart = State::apart_is_due(*w);
   }
   if (due_apart) s.deps.plan.post([&s] { s.work_apart(); });
+  if (targets && mission) s.deps.missions.set_targets(*mission, *std::move(targets));
   if (priors && mission) s.deps.missions.set_priors(*mission, std::move(*priors));
   if (keeps && mission) s.keep(*mission, std::move(keep));
   s.changed.notify_all();

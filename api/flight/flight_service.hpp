@@ -15,7 +15,9 @@
 #include "core/flight/checklist.hpp"
 #include "core/flight/command.hpp"
 #include "core/flight/control_lease.hpp"
+#include "core/flight/flown_time.hpp"
 #include "core/flight/plan_change.hpp"
+#include "core/localize/accuracy_goal.hpp"
 #include "core/types/fix.hpp"
 #include "core/types/plan.hpp"
 
@@ -81,6 +83,10 @@ class FlightService final : public MissionObserver, public MissionControl {
   /// Whether this mission's flight is in the air; and which mission flies this plan.
   bool flies(const MissionId& mission) override;
   std::optional<MissionId> flown_with(const PlanId& plan);
+  /// What the plan that the mission is or was flown by wants of its anchors; empty: none, flown by hand.
+  PlanTargets targets(const MissionId& mission);
+  /// How long its newest flight took beside its forecast; nothing in the air, and where none was.
+  std::optional<flight::FlownTime> flown_time(const MissionId& mission);
   /// Missions whose flight has ended on the ground since the last call: what was to be measured is.
   std::vector<MissionId> take_landed();
 

@@ -14,6 +14,8 @@
 
 namespace anchord::api {
 
+struct KeptOutcome;
+
 /// The shell round flight::Operations: thread, clocks, lock; what is shown (flight_show.cpp) and kept
 /// (flight_kept.cpp).
 struct FlightService::State {
@@ -32,7 +34,7 @@ struct FlightService::State {
   };
   /// What of the present flight was kept, shown and told; each flight begins anew.
   struct Last {
-    std::uint64_t flight{0}, kept{~0ULL}, shown{~0ULL}, priors_passed{0};
+    std::uint64_t flight{0}, kept{~0ULL}, shown{~0ULL}, priors_passed{0}, targets_passed{~0ULL};
     double shown_s{-10}, profiles_s{-10};
     bool flew{false};
   };
@@ -58,9 +60,11 @@ struct FlightService::State {
   flight::Groundwork groundwork(const Plan* plan);
   Result<Plan> wanted_plan(const MissionId& mission, bool undo);
   void recover();
-  /// The document to store, when the machine moved since the last call; empty text: forget it.
+  /// The document to store, when the machine moved since the last call.
   static bool to_keep(Work& w, std::string& text);
   static void note_landing(Work& w, const flight::ActiveFlight& f);
+  template <class Part>
+  Part outcome(const MissionId& mission, Part KeptOutcome::*part);
   void keep(const MissionId& mission, std::string document) const;
   nlohmann::ordered_json procedure(const flight::Operations& operations, const flight::ActiveFlight& f) const;
   void publish(Work& w) const;

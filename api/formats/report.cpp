@@ -155,10 +155,10 @@ std::string report_html(const Report& r) {
       "<div class=\"sig\"><div><span class=\"lab\">Flown by</span></div><div><span class=\"lab\">Checked "
       "by</span></div><div><span class=\"lab\">Accepted by, date</span></div></div>";
   out += footer(r, "evidence overleaf") + "</section>\n";
-  out += "<section class=\"sheet\">" + report::gates(r) + report::budgets(r) + report::methods(r) +
-         report::rejected(r) + report::flights(r) + report::iterations(r) + report::residual_plots(r) +
-         "<div style=\"margin-top:auto\"></div>" + footer(r, "end of the report") +
-         "</section>\n</body></html>\n";
+  out += "<section class=\"sheet\">" + report::gates(r) + report::goals(r) + report::budgets(r) +
+         report::methods(r) + report::rejected(r) + report::flights(r) + report::iterations(r) +
+         report::residual_plots(r) + "<div style=\"margin-top:auto\"></div>" +
+         footer(r, "end of the report") + "</section>\n</body></html>\n";
   return out;
 }
 

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "api/formats/evidence.hpp"
+#include "core/localize/accuracy_goal.hpp"
 #include "core/types/anchor.hpp"
 #include "core/types/estimate.hpp"
 
@@ -26,6 +27,7 @@ struct ReportAnchor {
   std::optional<Eigen::Vector3d> linear_m{}, wls_m{};  ///< by the dissertation's methods (eq 7.2, 7.10)
   ReportBudget budget{};                               ///< no shares: none known
   std::optional<Override> overridden{};
+  std::optional<AnchorGoal> goal{};          ///< that its accuracy is held against; none: no server, no goal
   std::optional<Eigen::Vector3d> truth_m{};  ///< in the frame of the positions; height NaN when it has none
 };
 

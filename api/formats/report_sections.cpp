@@ -108,6 +108,7 @@ constexpr std::array k_gate_words{
     GateWords{"lever_arm", "The lever arm fits the flight", "σ"},
     GateWords{"unseen_arm", "Error that a wrong lever arm would cause unseen", "m"},
     GateWords{"settled", "Rounds until the joint solution settled", ""},
+    GateWords{"target_sigma_m", "σ of the position", "m"},
     GateWords{"goal_h95_m", "95 % horizontal", "m"},
     GateWords{"goal_v95_m", "95 % vertical", "m"},
 };
@@ -213,6 +214,30 @@ std::string gates(const Report& report) {
   }
   return out + "<p class=\"note\">✕ failed. Only an anchor that passes all is accepted without a person." +
          words + "</p>";
+}
+
+std::string goals(const Report& report) {
+  std::string rows;
+  for (const auto& anchor : report.anchors) {
+    if (!anchor.goal || !anchor.estimate.best) continue;
+    std::string values;
+    bool within = true;
+    for (const auto& gate : goal_gates(anchor.estimate, *anchor.goal)) {
+      values += (values.empty() ? "" : ", ") + std::string(words_of(gate.name).asks) + " " +
+                (gate.value ? fixed(*gate.value, 3) : "–") + " m (limit ≤ " + fixed(gate.limit, 3) + " m)";
+      within = within && gate.passed;
+    }
+    rows += "<tr><td><b>" + html_text(name_of(anchor)) + "</b></td>" +
+            cell(within ? "within" : "✕ over", within ? "" : "bad") + cell(html_text(values), "") +
+            cell(html_text(goal_words(*anchor.goal)), "") + "</tr>";
+  }
+  if (rows.empty()) return {};
+  return "<h2>Accuracy goal</h2><table class=\"goals\"><thead><tr>" + head("Anchor", false) +
+         head("Goal", false) + head("Accuracy", false) + head("Whose goal", false) + "</tr></thead><tbody>" +
+         rows +
+         "</tbody></table><p class=\"note\">Whether it is accurate enough. It decides nothing about "
+         "acceptance: "
+         "the gates do.</p>";
 }
 
 std::string methods(const Report& report) {

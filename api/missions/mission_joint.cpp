@@ -82,13 +82,27 @@ void MissionService::set_priors(const MissionId& id, procedure::FlightPriors pri
   state_->schedule(flight);
 }
 
-void MissionService::State::take_priors(Flight& flight, Flight::Work& work) {
+void MissionService::set_targets(const MissionId& id, PlanTargets targets) {
+  const auto flight = state_->find(id);
+  if (!flight) return;
+  {
+    auto inbox = flight->inbox.lock();
+    inbox->new_targets = std::move(targets);
+  }
+  state_->schedule(flight);
+}
+
+/// What its flight found, and what is wanted of it, since the last rows.
+void MissionService::State::take_given(Flight& flight, Flight::Work& work) {
   std::optional<procedure::FlightPriors> priors;
+  std::optional<PlanTargets> targets;
   {
     auto inbox = flight.inbox.lock();
     priors = std::exchange(inbox->new_priors, std::nullopt);
+    targets = std::exchange(inbox->new_targets, std::nullopt);
   }
   if (priors) work.live.use_priors(*std::move(priors));
+  if (targets) work.live.use_targets(*std::move(targets));
 }
 
 }  // namespace anchord::api

@@ -157,7 +157,7 @@ void MissionService::State::work(Flight& flight) {
     for (auto it = rows.rbegin(); it != rows.rend(); ++it) inbox->queue.push_front(std::move(*it));
     return;
   }
-  take_priors(flight, *work);
+  take_given(flight, *work);
   std::size_t since_announced = 0;
   const SteadyTime now = steady_now();
   for (const auto& row : rows) {

@@ -11,6 +11,7 @@ flight::LiveMissionSetup MissionService::State::setup_of(const Mission& mission)
   setup.goal = deps.goal;
   setup.exclusions = exclusions_of(mission.id);
   setup.priors = deps.kept_priors(mission.id);
+  setup.targets = deps.kept_targets(mission.id);
   if (mission.site && mission.frame == TrackFrame::wgs84) {
     if (const auto site = deps.sites.site(*mission.site)) setup.live.origin = site.value().origin;
   }
@@ -66,7 +67,7 @@ bool MissionService::State::rebuild_slice(Flight& flight) {
     if (!stored) {
       work->rebuild.reset();
       std::ranges::sort(work->rebuilt);
-      take_priors(flight, *work);
+      take_given(flight, *work);
       work->live.end_reading();
       return false;
     }

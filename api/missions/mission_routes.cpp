@@ -230,7 +230,9 @@ Response track(MissionApi& s, const Request& request) {
 }  // namespace
 
 Response mission_answer(MissionApi& s, int status, const Mission& mission) {
-  Response response = json_response(status, with_counts(s, mission));
+  auto body = with_counts(s, mission);
+  body["flight_time"] = s.flight_time ? s.flight_time(mission.id) : Ordered(nullptr);
+  Response response = json_response(status, body);
   response.header("ETag", content_tag(response.body, "m-"));
   return response;
 }

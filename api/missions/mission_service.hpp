@@ -63,7 +63,7 @@ class MissionService {
     Executor& joint;            ///< joint solutions in flight: seconds each
     LateWriter& late;
     ExclusionStore& exclusions;
-    AccuracyGoal goal{};                       ///< an anchor within it is converged
+    AccuracyGoal goal{};                       ///< of anchors that no flown plan has a target for
     std::function<std::string()> device_rows;  ///< more rows of topic `devices`, comma between them
     /// What the promoted models say of a range; nothing while none is promoted.
     std::function<std::optional<RangeModel>(const Range&)> predict;
@@ -72,6 +72,8 @@ class MissionService {
     TrackLimits track{};      ///< what the positions of a flight are held against
     /// What turns and height searches of a mission's flight told, as kept with it.
     std::function<procedure::FlightPriors(const MissionId&)> kept_priors;
+    /// What the plan that it was flown by wants of its anchors, likewise.
+    std::function<PlanTargets(const MissionId&)> kept_targets;
   };
   /// Missions kept in memory although nothing of them is in the air: finished, or silent for k_silent_s. The
   /// others of these are evicted, least recently used first; the store has all of them.
@@ -113,6 +115,9 @@ class MissionService {
   /// What the turns and height searches of its flight told of its anchors: priors of every running estimate
   /// from now on. Never waits.
   void set_priors(const MissionId& id, procedure::FlightPriors priors);
+  /// What the plan that is flown now wants of its anchors: what its estimates are held against from now on.
+  /// Never waits.
+  void set_targets(const MissionId& id, PlanTargets targets);
 
   struct LiveView {
     Mission mission;

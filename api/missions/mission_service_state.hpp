@@ -44,6 +44,7 @@ struct MissionService::Flight {
     std::deque<flight::LiveRow> queue;
     flight::RowsAhead ahead{k_max_queued_rows};
     std::optional<procedure::FlightPriors> new_priors;
+    std::optional<PlanTargets> new_targets;
     bool view_wanted{false};  ///< by one who does not wait: made as soon as the strand is at rest
     std::optional<LiveView> view;
     SteadyTime view_made{};
@@ -56,7 +57,7 @@ struct MissionService::Flight {
     bool gone{false};
     std::optional<SteadyTime> fix_arrival{}, range_arrival{};
     /// Something is still to be done, rows that are read back apart.
-    bool busy() const { return scheduled || closing || new_priors || !queue.empty(); }
+    bool busy() const { return scheduled || closing || new_priors || new_targets || !queue.empty(); }
   };
   Locked<Inbox> inbox;
   Locked<flight::PositionWatch> positions;  ///< held for one fix; no other lock is taken under it
@@ -189,7 +190,7 @@ struct MissionService::State : std::enable_shared_from_this<MissionService::Stat
   void finish_joint(Flight& flight, const FlightSolution* solution, UtcTime cut,
                     std::chrono::steady_clock::duration took, std::uint64_t generation);
   void publish_devices();
-  static void take_priors(Flight& flight, Flight::Work& work);
+  static void take_given(Flight& flight, Flight::Work& work);
   LiveView view(Flight& flight, const Flight::Work& work) const;
   static Mission mission_of(Flight& flight) {
     const auto inbox = flight.inbox.lock();

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -53,6 +54,8 @@ struct MissionApi {
   Audit audit;
   MissionControl& control;
   FlightActions flight{};
+  /// How long a mission's flight took beside its forecast, null where none has ended; given by api/flight.
+  std::function<nlohmann::ordered_json(const MissionId&)> flight_time{};
 };
 
 /// A mission by the path: 404 where none ever was, 410 for one in the bin, with the way back.

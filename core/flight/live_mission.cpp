@@ -66,6 +66,17 @@ void LiveMission::use_priors(procedure::FlightPriors priors) {
   update_live_priors();
 }
 
+void LiveMission::use_targets(PlanTargets targets) {
+  if (targets == setup_.targets) return;
+  setup_.targets = std::move(targets);
+  if (reading_) return;  // every anchor is announced at its end
+  for (auto& estimate : live_.estimates()) announce_estimate(std::move(estimate));
+}
+
+void LiveMission::assess(Estimate& estimate) const {
+  assess_goal(estimate, anchor_goal(estimate.anchor, {&setup_.targets, 1}, setup_.goal));
+}
+
 /// Before the first good fix there is no frame to give them in.
 void LiveMission::update_live_priors() {
   const auto origin = live_.origin();
@@ -87,7 +98,7 @@ void LiveMission::settle() {
 }
 
 void LiveMission::announce_estimate(Estimate estimate) {
-  assess_goal(estimate, setup_.goal);
+  assess(estimate);
   const auto status = anchor_status(estimate);
   const auto [known, is_new] = statuses_.try_emplace(estimate.anchor, status);
   const bool changed = is_new || known->second != status;
@@ -171,7 +182,7 @@ bool LiveMission::adopt(const FlightSolution& solution, UtcTime cut, std::uint64
 
 std::vector<Estimate> LiveMission::estimates() const {
   auto out = live_.estimates();
-  for (auto& estimate : out) assess_goal(estimate, setup_.goal);
+  for (auto& estimate : out) assess(estimate);
   return out;
 }
 

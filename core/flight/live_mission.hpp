@@ -32,7 +32,8 @@ namespace anchord::flight {
 struct LiveMissionSetup {
   Mission mission;
   LiveOptions live{};
-  AccuracyGoal goal{};  ///< an anchor within it that no gate holds back is converged
+  AccuracyGoal goal{};    ///< of anchors without a target: within it, and held back by no gate, is converged
+  PlanTargets targets{};  ///< of the plan that is flown
   std::vector<Exclusion> exclusions{};
   procedure::FlightPriors priors{};  ///< what turns and height searches found before
 };
@@ -62,6 +63,8 @@ class LiveMission {
   void add(const LiveRow& row);
   /// What turns and height searches found, from the next solve on; waits for the first good fix.
   void use_priors(procedure::FlightPriors priors);
+  /// Another plan is flown: every anchor is held against what it wants.
+  void use_targets(PlanTargets targets);
   /// The rows of a batch are in: decided ranges and changed estimates become events.
   void settle();
   /// No more rows: ranges that wait for a fix are rejected, every anchor is solved once more. Then settle().
@@ -105,6 +108,7 @@ class LiveMission {
   void announce_fixes();
   void announce_estimate(Estimate estimate);
   void update_live_priors();
+  void assess(Estimate& estimate) const;
 
   LiveMissionSetup setup_;
   LiveFlight live_;

@@ -43,6 +43,13 @@ FlightStatus ActiveFlight::status() const {
 
 std::string ActiveFlight::ended() const { return aborted.empty() ? control.engine().state().ended : aborted; }
 
+std::optional<FlownTime> ActiveFlight::flown_time() const {
+  const auto& engine = control.engine();
+  if (flying() || engine.state().n_transitions == 0) return std::nullopt;
+  return FlownTime{forecast_at_start, engine.flown_s(aborted_s), engine.state().completed && aborted.empty(),
+                   changes.n > 0};
+}
+
 const FlightCommand* Operations::command(std::uint64_t number) const {
   const auto it = std::ranges::find(commands_, number, &FlightCommand::number);
   return it == commands_.end() ? nullptr : &*it;

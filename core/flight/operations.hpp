@@ -15,6 +15,7 @@
 #include "core/flight/checklist.hpp"
 #include "core/flight/command.hpp"
 #include "core/flight/control_lease.hpp"
+#include "core/flight/flown_time.hpp"
 #include "core/flight/measured_time.hpp"
 #include "core/flight/plan_change.hpp"
 #include "core/geo/enu.hpp"
@@ -78,6 +79,8 @@ struct ActiveFlight {
   FlightStatus status() const;
   /// Why the work is over; empty while it goes on.
   std::string ended() const;
+  /// Of one that has ended; nothing while it goes on.
+  std::optional<FlownTime> flown_time() const;
   /// What is known of the anchors' sides: of before a restart, and of the engine since.
   procedure::FlightPriors priors() const {
     return procedure::merged(priors_before, procedure::flight_priors(control.engine().priors(), frame));
@@ -94,8 +97,9 @@ struct ActiveFlight {
   procedure::FlightPriors priors_before;
   std::string aborted;  ///< who gave the aircraft back to the pilot; empty: nobody
   double aborted_s{0};
-  std::optional<planning::FlightTime> forecast{};
-  std::optional<Eigen::Vector3d> former_m{};  ///< manual: the last fix, for its speed
+  std::optional<planning::FlightTime> forecast{};           ///< of the plan that is flown now
+  std::optional<planning::FlightTime> forecast_at_start{};  ///< of the plan that was started
+  std::optional<Eigen::Vector3d> former_m{};                ///< manual: the last fix, for its speed
   std::optional<double> former_s{};
   procedure::VehicleView by_hand{};
 };
@@ -110,6 +114,7 @@ struct KeptFlight {
   procedure::FlightPriors priors;
   DroneIdentity aircraft;  ///< system 0: not said
   FlownChanges changes;
+  std::optional<planning::FlightTime> forecast_at_start{};
 };
 
 /// What a checklist takes long to find out: asked before, by whoever drives.

@@ -167,7 +167,7 @@ Result<FlightCommand> Operations::begin(const Now& now, const Mission& mission, 
                   procedure::FlightControl(std::move(setup), frame, manual ? nullptr : drone_));
   ++n_flights_;
   auto& f = *flight_;
-  if (ground.check) f.forecast = ground.check->time;
+  if (ground.check) f.forecast = f.forecast_at_start = ground.check->time;
   f.changes.own_origin = plan.origin.has_value();
   if (!manual) f.changes.autopilot_keeps = fence_given(plan);
   f.control.fix(*r.fix_s, here, r.fix->fix);
@@ -263,6 +263,7 @@ Result<void> Operations::recover(const Now& now, KeptFlight kept) {
   ++n_flights_;
   flight_->priors_before = std::move(kept.priors);
   flight_->changes = std::move(kept.changes);
+  flight_->forecast_at_start = kept.forecast_at_start;
   if (const auto check = planning::check_plan(flight_->plan); check && flight_->changes.n == 0)
     flight_->forecast = check.value().time;
   // Not heard yet: whether the hold leaves is decided by the mode that the first heartbeat shows.

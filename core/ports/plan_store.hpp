@@ -38,6 +38,8 @@ class PlanStore {
   /// what was being flown. Empty text forgets it.
   virtual Result<void> keep_procedure(const MissionId& mission, std::string_view state_json, UtcTime now) = 0;
   virtual Result<std::vector<std::pair<MissionId, std::string>>> procedures() = 0;
+  /// Of one mission; empty where none is kept.
+  virtual Result<std::string> procedure(const MissionId& mission) = 0;
 };
 
 }  // namespace anchord

@@ -31,12 +31,6 @@ double widest_gap_deg(std::span<const Eigen::Vector3d> points, const Eigen::Vect
 
 }  // namespace
 
-std::optional<double> position_sigma_m(const Estimate& estimate) {
-  if (!estimate.best) return std::nullopt;
-  const double trace = estimate.best->covariance_m2.trace();
-  return std::isfinite(trace) && trace >= 0 ? std::optional(std::sqrt(trace)) : std::nullopt;
-}
-
 std::string why_not_done(const std::optional<Estimate>& estimate, std::span<const Eigen::Vector3d> points,
                          const ExitRule& rule) {
   constexpr double k_flat_m = 2, k_one_side_deg = 230, k_nlos_share = 0.4, k_bias_m = 0.1;

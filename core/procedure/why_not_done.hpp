@@ -16,7 +16,4 @@ namespace anchord::procedure {
 std::string why_not_done(const std::optional<Estimate>& estimate, std::span<const Eigen::Vector3d> points,
                          const ExitRule& rule);
 
-/// One-sigma of the position, root of the summed variance; nothing without a position.
-std::optional<double> position_sigma_m(const Estimate& estimate);
-
 }  // namespace anchord::procedure

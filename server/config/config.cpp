@@ -90,7 +90,9 @@ constexpr std::array k_options = {
     Option{"ws.message_bytes", "65536", "largest message a client may send", count},
     Option{"ws.ping_s", "15", "period of protocol pings", seconds},
     Option{"ws.idle_s", "45", "silence after which a peer is dead", seconds},
-    Option{"goal.h95_m", "0.2", "a live anchor is converged when its horizontal 95 % radius is within this",
+    Option{"goal.h95_m", "0.2",
+           "an anchor without a target in a flown plan is accurate enough when its horizontal 95 % radius "
+           "is within this",
            metres},
     Option{"goal.v95_m", "0.4", "and its vertical 95 % bound within this", metres},
     Option{"solve.site_outline", "on",

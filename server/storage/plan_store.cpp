@@ -18,6 +18,9 @@ constexpr const char* k_keep =
     "ON CONFLICT (mission_key) DO UPDATE SET state_json = excluded.state_json, "
     "changed_t_ns = excluded.changed_t_ns";
 constexpr const char* k_forget = "DELETE FROM mission_procedure WHERE mission_key = ?1";
+constexpr const char* k_procedure =
+    "SELECT p.state_json FROM mission_procedure p JOIN mission m ON m.mission_key = p.mission_key "
+    "WHERE m.id = ?1";
 constexpr const char* k_procedures =
     "SELECT m.id, p.state_json FROM mission_procedure p JOIN mission m ON m.mission_key = p.mission_key "
     "ORDER BY m.id";
@@ -125,6 +128,14 @@ class SqlPlanStore final : public PlanStore {
         rows.emplace_back(id, query.text());
       }
       return rows;
+    });
+  }
+
+  Result<std::string> procedure(const MissionId& mission) override {
+    return read_value<std::string>(gate_, [&](Connection& c) -> Result<std::string> {
+      Query query(c, k_procedure);
+      query << mission;
+      return query.step() ? query.text() : std::string{};
     });
   }
 

@@ -130,11 +130,12 @@ class AppFixture : public ::testing::Test {
   }
 
   /// A stored calibration of anchors 0x6a2f and 0x6a3c, `finish` having made of each what the test needs; its
-  /// id.
-  std::string stored_calibration(const std::function<void(Estimate&)>& finish) {
+  /// id. Of this mission, else of a new one.
+  std::string stored_calibration(const std::function<void(Estimate&)>& finish, std::string of = "") {
+    if (of.empty()) of = mission();
     Calibration c;
     c.id.uuid = make_uuid_v7(clock_.now());
-    c.missions = {MissionId{parse_uuid(mission()).value()}};
+    c.missions = {MissionId{parse_uuid(of).value()}};
     c.origin = Wgs84{51.023, 3.713, 55};
     c.settings = {"{}"};
     c.created = clock_.now();

@@ -1,4 +1,5 @@
 // What is shown of a flight over REST, and where one may begin.
+#include "core/flight/flown_time.hpp"
 #include "flights_fixture.hpp"
 
 namespace anchord::test {
@@ -83,6 +84,63 @@ TEST_F(Flights, StartingAgainInTheAirNeedsAHomeOnTheGround) {
   ASSERT_EQ(act("return", lease).status, 202);
   EXPECT_TRUE(fly_until([&] { return procedure()["step"] == "done"; }, 120)) << procedure().dump(1);
   EXPECT_LT((drone_->autopilot.vehicle().position_m() - k_home_m).norm(), 2) << "on the ground, at home";
+}
+
+/// Both are of the flight as it was started: what comes of it later is compared with what was promised.
+TEST_F(Flights, TheFlownTimeIsKeptBesideItsForecast) {
+  mission_ = mission();
+  const auto plan = make_plan();
+  const auto check = json(post("/api/v1/plans/" + plan + "/validate", ""));
+  fly(12);
+  check_everything();
+  const std::string lease = control()["lease"];
+  EXPECT_TRUE(json(get(base()))["flight_time"].is_null());
+  const double started = drone_->now;
+  ASSERT_EQ(act("start", lease, R"(,"plan":")" + plan + '"').status, 202);
+  fly(30);
+  EXPECT_TRUE(json(get(base()))["flight_time"].is_null()) << "in the air";
+  ASSERT_TRUE(fly_until([&] { return procedure()["step"] == "done"; }, 900)) << procedure().dump(1);
+  ASSERT_EQ(procedure()["status"], "done");
+  const Json time = json(get(base()))["flight_time"];
+  const Json forecast{{"low", check["duration_low_s"]},
+                      {"expected", check["duration_s"]},
+                      {"high", check["duration_high_s"]}};
+  EXPECT_EQ(time["forecast_s"], forecast) << check.dump(1);
+  const double flown_s = time["flown_s"], low_s = time["forecast_s"]["low"],
+               high_s = time["forecast_s"]["high"];
+  EXPECT_NEAR(flown_s, drone_->now - started, 1) << "looked at every half second";
+  EXPECT_EQ(time["completed"], true);
+  EXPECT_EQ(time["plan_changed"], false);
+  EXPECT_EQ(time["against_forecast"], flown_s < low_s ? "shorter" : flown_s > high_s ? "longer" : "within");
+  restart();
+  EXPECT_EQ(json(get(base()))["flight_time"], time);
+  EXPECT_TRUE(json(get("/api/v1/missions/" + mission()))["flight_time"].is_null()) << "of another mission";
+}
+
+TEST_F(Flights, ATimeThatWasCutShortIsNotHeldAgainstTheForecast) {
+  ASSERT_EQ(act("land", take_off()).status, 202);
+  ASSERT_TRUE(fly_until([&] { return procedure()["step"] == "done"; }, 60));
+  const Json time = json(get(base()))["flight_time"];
+  EXPECT_GT(time["flown_s"], 5.0);
+  EXPECT_TRUE(time["forecast_s"].is_object());
+  EXPECT_EQ(time["completed"], false);
+  EXPECT_TRUE(time["against_forecast"].is_null());
+}
+
+TEST(FlownTime, LiesWithinTheSpreadOrOutsideOfOneEndOfIt) {
+  using flight::AgainstForecast;
+  flight::FlownTime time{.forecast = planning::FlightTime{300, 400, 500}, .completed = true};
+  const auto against = [&](double flown_s) {
+    time.flown_s = flown_s;
+    return time.against();
+  };
+  EXPECT_EQ(against(299.9), AgainstForecast::shorter);
+  for (const double s : {300.0, 400.0, 500.0}) EXPECT_EQ(against(s), AgainstForecast::within) << s;
+  EXPECT_EQ(against(500.1), AgainstForecast::longer);
+  time.plan_changed = true;
+  EXPECT_EQ(against(500.1), std::nullopt) << "another plan was flown";
+  time = {.flown_s = 400, .completed = true};
+  EXPECT_EQ(time.against(), std::nullopt) << "nothing was forecast";
 }
 
 /// How far apart the safety checks of a flight are is measured while it is in the air, and only then.

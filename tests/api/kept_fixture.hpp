@@ -115,12 +115,12 @@ class KeptFixture : public AppFixture {
     for (const auto& event : events["items"]) out.push_back(event.value("code", ""));
     return out;
   }
-  /// A mission in the air by hand, and its lease.
-  std::string fly(const std::string& id) {
-    const auto plan = json(post("/api/v1/plans", R"({"name":"Hall","building_height_m":8,
+  /// A mission in the air by hand, and its lease; more of its plan and of the settings in it.
+  std::string fly(const std::string& id, const std::string& of_plan = "", const std::string& setting = "") {
+    const auto plan = json(post("/api/v1/plans", R"({"name":"Hall","building_height_m":8,)" + of_plan + R"(
       "origin":{"lon":3.7131,"lat":51.0231,"h_m":55.5},
       "outline":{"type":"Polygon","coordinates":[[[3.7131,51.0231],[3.7135275,51.0231],[3.7135275,51.0232799],[3.7131,51.0232799]]]},
-      "settings":{"keep_out_m":4,"max_height_m":20},
+      "settings":{)" + setting + R"("keep_out_m":4,"max_height_m":20},
       "waypoints":[{"lon":3.7130,"lat":51.02305,"height_above_ground_m":4},
                    {"lon":3.71362,"lat":51.02305,"height_above_ground_m":9}]})"));
     plan_ = plan["id"];

@@ -8,6 +8,7 @@
 #include "api/stream/conversation.hpp"
 #include "core/geo/enu.hpp"
 #include "core/localize/flight_solver.hpp"
+#include "core/ports/plan_store.hpp"
 #include "mission_fixture.hpp"
 
 namespace anchord::test {
@@ -133,6 +134,37 @@ TEST_F(MissionLive, CallsAnAnchorConvergedOnlyWithinTheGoal) {
     EXPECT_TRUE(all_are(live(id))) << Json(live(id)).dump();
     close();
   }
+}
+
+/// The site wants more than can be had; the plan that was flown wants no more than 5 m, of one anchor.
+TEST_F(MissionLive, HoldsAnAnchorAgainstTheTargetOfItsFlownPlanAndNotAgainstTheSites) {
+  const auto flight = streamed(MadeFlight{});
+  HeldExecutor held;
+  joint_ = &held;
+  goal_ = {.h95_m = 1e-4, .v95_m = 1e-4};
+  restart();
+  const auto id = mission("local");
+  const MissionId key{parse_uuid(id).value()};
+  ASSERT_TRUE(database_->stores().plans.keep_procedure(
+      key, R"({"landed":true,"targets":{"sigma_m":null,"anchors":{"0x6000":5}}})", UtcTime{}));
+  deliver(id, flight, 0, 120.5);
+  const auto done = [&] {
+    const auto anchors = live(id);
+    return anchors.contains("0x6000") && anchors.at("0x6000")["status"] == "converged";
+  };
+  for (const auto end = std::chrono::steady_clock::now() + std::chrono::minutes(1);
+       std::chrono::steady_clock::now() < end && !done();) {
+    (void)held.run_one();
+    std::this_thread::yield();
+  }
+  for (const auto& [anchor, properties] : live(id)) {
+    const bool own = anchor == "0x6000";
+    EXPECT_EQ(properties["status"], own ? "converged" : "estimating") << anchor;
+    EXPECT_EQ(properties["goal"]["source"], own ? "anchor_target" : "site") << anchor;
+    EXPECT_EQ(properties["quality"]["gates"].back()["name"], own ? "target_sigma_m" : "goal_v95_m") << anchor;
+  }
+  EXPECT_EQ(json(get("/api/v1/missions/" + id))["flight_time"], nullptr);
+  close();
 }
 
 /// Newest estimates (or poses, under no anchor) told on the hub; waits for the next message, never longer

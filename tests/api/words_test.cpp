@@ -23,8 +23,10 @@
 #include "api/webhooks/cloud_event.hpp"
 #include "core/flight/command.hpp"
 #include "core/flight/control_lease.hpp"
+#include "core/flight/flown_time.hpp"
 #include "core/floor_plan/georeference.hpp"
 #include "core/floor_plan/image_head.hpp"
+#include "core/localize/accuracy_goal.hpp"
 #include "core/ml/recipe.hpp"
 #include "core/planning/local_plan.hpp"
 #include "core/planning/plan_change.hpp"
@@ -225,6 +227,8 @@ TEST(WireWords, AreThoseOfOpenApi) {
       {"MissionCreate.track_point", words(k_point_words)},
       {"Mission.track_point", words(k_point_words)},
       {"Mission.state", words(k_mission_state_words)},
+      {"FlightTime.against_forecast", words(flight::k_against_forecast_words)},
+      {"AnchorGoal.source", words(k_goal_source_words)},
       {"MissionAction.action", words({"finish", "take_devices"}, flight::k_flight_action_words)},
       {"MissionAction.mode", words(flight::k_flight_mode_words)},
       {"Procedure.mode", words(flight::k_flight_mode_words)},

@@ -150,14 +150,39 @@ test('what was loaded while nothing else was to be done opens during an outage',
   await page.close();
 });
 
-test('a link to a plan, a run or a flight that is not known says so', async () => {
+test('every address that names something unknown says so, and what to do; none shows another thing in silence', async () => {
   const gone = '00000000-0000-4000-8000-000000000000',
-    { page, id } = await openPage(browser, server, { hash: `#/plan/${gone}` });
-  await id('unknown-plan').getByText(`No plan ${gone} is stored here`).waitFor({ timeout: 20_000 });
-  await page.goto(`${server.url}/#/models/runs/${gone}`);
-  await id('unknown-run').getByText(`No training run ${gone} is stored here`).waitFor({ timeout: 20_000 });
-  await page.goto(`${server.url}/#/replay/${gone}`);
-  await page.getByText('No flight is stored under this address').waitFor({ timeout: 20_000 });
+    { page, seen, id } = await openPage(browser, server, { hash: '#/live' });
+  await live(id);
+  for (const [hash, what, says, todo] of [
+    [`#/plan/${gone}`, 'plan', `No plan ${gone} is stored here.`, 'another plan is shown'],
+    [`#/models/runs/${gone}`, 'run', `No training run ${gone} is stored here.`, 'another run is shown'],
+    [`#/models/runs/no-id`, 'run', 'No training run no-id is stored here.', 'another run is shown'],
+    [`#/replay/${gone}`, 'flight', `No flight ${gone} is stored here.`, 'choose a flight in System'],
+    [`#/replay/${gone}?t=3`, 'flight', `No flight ${gone} is stored here.`, 'choose a flight in System'],
+    [
+      '#/anchors/0xdead',
+      'anchor',
+      'No anchor 0xdead is published or in range in this flight.',
+      'choose one from the table',
+    ],
+    ['#/anchors/%E0%A4%A', 'anchor', 'No anchor %E0%A4%A is published or in range in this flight.', 'choose one'],
+    ['#/nothing', 'page', 'No page #/nothing is in this dashboard.', 'choose a view'],
+    [`#/live/${gone}`, 'page', `No page #/live/${gone} is in this dashboard.`, 'choose a view'],
+    [`#/models/${gone}`, 'page', `No page #/models/${gone} is in this dashboard.`, 'choose a view'],
+    ['#/system/floors', 'page', 'No page #/system/floors is in this dashboard.', 'System is shown'],
+    ['#/guide/nothing', 'page', 'No page #/guide/nothing is in the guide.', 'its first page is shown'],
+  ]) {
+    await page.evaluate((to) => (location.hash = to), hash);
+    await id(`unknown-${what}`).getByText(says, { exact: true }).waitFor({ timeout: 20_000 });
+    assert.match(await text(id(`unknown-${what}`)), new RegExp(`Check the address;.*${todo}`), hash);
+    await page.evaluate(() => (location.hash = '#/live'));
+    await id(`unknown-${what}`).waitFor({ state: 'detached', timeout: 20_000 });
+  }
+  assert.deepEqual(
+    seen.errors.filter((e) => !/40[0-9]|422/.test(e)), // what the server does not know is an answer of it
+    [],
+  );
   await page.close();
 });
 
@@ -166,7 +191,7 @@ test('a link to an anchor that is not known says so; one that is known opens it'
   await live(id);
   await eventually(
     'it says so',
-    async () => /No anchor 0xdead is known/.test(await text(id('unknown-anchor'))),
+    async () => /No anchor 0xdead is published or in range/.test(await text(id('unknown-anchor'))),
     10_000,
   );
   assert.equal(await id('anchor-detail').count(), 0);
@@ -175,7 +200,7 @@ test('a link to an anchor that is not known says so; one that is known opens it'
   await page.evaluate((a) => (location.hash = `#/anchors/${a}`), known);
   await eventually('it is opened', async () => (await text(id('anchor-detail').locator('h2'))) === known, 5000);
   await page.evaluate(() => (location.hash = '#/replay/0197a3b0-5d10-7b1e-9c55-0a1b2c3d4e5f'));
-  await page.getByText('No flight is stored under this address').waitFor();
+  await id('unknown-flight').waitFor();
   await page.close();
 });
 

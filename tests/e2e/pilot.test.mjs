@@ -276,6 +276,13 @@ test('start is blocked until the checklist is green; then the aircraft flies, ho
     { anchors, provenance } = await get(`/api/v1/calibrations/${made}`);
   for (const { network_id } of anchors) assert.ok(await report.getByText(network_id).count(), network_id);
   assert.ok(provenance.n_clues > 0, 'what the turn and the height search told went into it');
+  // One limit for "accurate enough": the target of the plan that was flown, in the calibration, the report and the review.
+  for (const { network_id, goal, quality } of anchors) {
+    assert.equal(goal.source, 'plan_target', network_id);
+    const row = await text(id('draft').locator('tbody tr', { hasText: network_id }));
+    assert.equal(row.includes(`over the ${goal.words}`), quality.acceptable && !goal.reached, row);
+  }
+  assert.ok(await report.getByText(anchors[0].goal.words, { exact: true }).count(), 'the report names the goal');
   await picture(report, 'report-light');
   // It fits the page to print on, and a phone.
   const widest = () =>
@@ -295,6 +302,13 @@ test('start is blocked until the checklist is green; then the aircraft flies, ho
   await picture(report, 'report-print');
   await report.emulateMedia({ media: 'screen' });
   await report.close();
+  // How long it took is shown beside what was forecast at Start; one that was ended by hand is not held against it.
+  const { flight_time } = await get(`/api/v1/missions/${mission}`);
+  assert.ok(flight_time.forecast_s.low < flight_time.forecast_s.high);
+  assert.match(
+    await text(id('publish').getByTestId('flown-time')),
+    /^Flown in \d\d:\d\d; forecast at Start \d\d:\d\d to \d\d:\d\d. Not compared: the flight ended before its plan was flown.$/,
+  );
   // So short a flight leaves anchors that lack something: a plan about those, to look at and to save.
   const lacking = Number(/(\d+)$/.exec(await text(id('fly-again')))[1]);
   assert.ok(lacking > 0);

@@ -1,5 +1,6 @@
 import { describe, expect, it } from 'vitest';
-import { row_of } from '../src/api/anchors';
+import { over_goal_words, row_of } from '../src/api/anchors';
+import { STATUS_LOOK } from '../src/ui/marks';
 import { why_not_done } from '../src/ui/words';
 
 const published = (more: object) =>
@@ -40,5 +41,49 @@ describe('a published anchor', () => {
       help: 'points at another height',
     });
     expect(published({ budget: null }).budget).toBeNull();
+  });
+});
+
+describe('an anchor of a calibration', () => {
+  const limit = (name: string, value: number, limit: number) => ({
+      name,
+      value,
+      limit,
+      passed: value <= limit,
+      why: '',
+    }),
+    target = (sigma_m: number) => ({
+      source: 'anchor_target',
+      words: 'target of the anchor in the flown plan, sigma of the position 3 m',
+      reached: sigma_m <= 3,
+      limits: [limit('target_sigma_m', sigma_m, 3)],
+    }),
+    of = (goal: object | null, acceptable = true) =>
+      published({ status: undefined, goal, quality: { verdict: 'ok', acceptable } }),
+    look = (goal: object | null) => STATUS_LOOK[of(goal).status][1];
+  it('is green within the goal that the server names, amber over it', () => {
+    expect(of(target(2.9)).status).toBe('within_goal');
+    expect(look(target(2.9))).toBe('ok');
+    expect(over_goal_words(of(target(2.9)))).toBe('');
+    expect(of(target(3.21)).status).toBe('over_goal');
+    expect(look(target(3.21))).toBe('caution');
+    expect(over_goal_words(of(target(3.21)))).toBe(
+      'over the target of the anchor in the flown plan, sigma of the position 3 m: 3.21 m',
+    );
+  });
+  it('names every limit of the site that it is over', () => {
+    const site = {
+      source: 'site',
+      words: 'goal of the site, 95 % 0.2 m horizontal and 0.4 m vertical',
+      reached: false,
+      limits: [limit('goal_h95_m', 0.21, 0.2), limit('goal_v95_m', 0.3, 0.4)],
+    };
+    expect(over_goal_words(of(site))).toBe(
+      'over the goal of the site, 95 % 0.2 m horizontal and 0.4 m vertical: 0.21 m',
+    );
+  });
+  it('is never green where nobody named a goal, and withheld whatever its accuracy', () => {
+    expect(look(null)).not.toBe('ok');
+    expect(of(target(0.01), false).status).toBe('withheld');
   });
 });

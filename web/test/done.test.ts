@@ -1,20 +1,19 @@
 import { describe, expect, it } from 'vitest';
 import { procedure } from '../src/live/flight_messages';
-import { estimate, mission, type EstimateMsg } from '../src/live/messages';
-import {
-  accuracy_goal,
-  against_goal,
-  as_shown,
-  done_count,
-  goal_of,
-  likelier,
-  over_goal_words,
-} from '../src/state/done';
+import { estimate, mission } from '../src/live/messages';
+import { as_shown, done_count, goal_of, likelier } from '../src/state/done';
 import { Scene } from '../src/state/scene';
 import { STATUS_LOOK } from '../src/ui/marks';
 import { why_not_done } from '../src/ui/words';
 
 const goal = (h95_m: number) => ({ name: 'goal_h95_m', value: h95_m, limit: 0.25, passed: h95_m <= 0.25, why: '' });
+const target = (sigma_m: number, limit: number) => ({
+  name: 'target_sigma_m',
+  value: sigma_m,
+  limit,
+  passed: sigma_m <= limit,
+  why: '',
+});
 const anchor = (id: string, status: string, h95_m = 0.1) =>
   estimate({ mission: 'm', anchor: id, t_us: 1, status, verdict: 'ok', h95_m, gates: [goal(h95_m)] })!;
 const flight = (tasks: object[], status = 'running') =>
@@ -25,33 +24,30 @@ const m = mission({ mission: 'm', anchors_found: 4, anchors_converged: 4 })!;
 describe('an anchor is done', () => {
   it('by the word of the server where no procedure flies', () => {
     expect(as_shown(anchor('0x1', 'converged'), null).status).toBe('converged');
-    expect(goal_of(anchor('0x1', 'estimating'), null)).toEqual({ of: 'h95', limit_m: 0.25 });
+    expect(goal_of(anchor('0x1', 'estimating'))).toEqual({ of: 'h95', limit_m: 0.25 });
+    expect(goal_of({ ...anchor('0x1', 'estimating'), gates: [target(0.4, 0.03)] })).toEqual({
+      of: 'sigma',
+      limit_m: 0.03,
+    });
+    expect(goal_of(null)).toBeNull();
   });
   it('when the procedure reached its target, not while it still works on it', () => {
     const p = flight([task('0x1', true, true), task('0x2', false, false, 'accuracy 0.083 m, wanted 0.030 m')]);
     expect(as_shown(anchor('0x1', 'converged'), p).status).toBe('converged');
     expect(as_shown(anchor('0x2', 'converged'), p).status).toBe('estimating');
-    expect(goal_of(anchor('0x2', 'converged'), p)).toEqual({ of: 'sigma', limit_m: 0.03 });
-    const own = flight([{ ...task('0x2', false, false), target_sigma_m: 0.01 }]);
-    expect(goal_of(anchor('0x2', 'converged'), own)).toEqual({ of: 'sigma', limit_m: 0.01 });
   });
-  it('by its own target, where it has one, whatever the goal of the site', () => {
-    const own = flight([{ ...task('0x1', false, true), target_sigma_m: 3 }, task('0x2', false, false)]),
-      far = { ...anchor('0x1', 'estimating', 4), cov_enu_m2: [4, 0, 0, 1, 0, 1] as const },
-      shown = as_shown(far, own);
+  it('for good once the procedure reached its target, unless another gate holds it back', () => {
+    const p = flight([task('0x1', true, true), task('0x2', false, false)]),
+      far = { ...anchor('0x1', 'estimating'), gates: [target(3.1, 3)] },
+      shown = as_shown(far, p);
     expect(shown.status).toBe('converged');
     expect(shown.gates.map((g) => [g.name, g.limit, g.passed])).toEqual([['target_sigma_m', 3, true]]);
     expect(why_not_done(shown)).toBeNull();
-    // Accurate enough for the site, not for its flight: one limit, the target.
-    const near = as_shown(anchor('0x2', 'converged'), own);
+    const near = as_shown({ ...anchor('0x2', 'estimating'), gates: [target(3.1, 3)] }, p);
     expect(near.status).toBe('estimating');
-    expect(near.gates.filter((g) => !g.passed).map((g) => g.name)).toEqual(['target_sigma_m']);
-    // Another gate still holds it back.
+    expect(near.gates.map((g) => g.passed)).toEqual([false]);
     const held = { name: 'halves', value: 30, limit: 16, passed: false, why: '' };
-    expect(as_shown({ ...(far as never as EstimateMsg), gates: [...far.gates, held] }, own).status).toBe('estimating');
-    const passes = { ...(far as never as EstimateMsg), status: 'passes' as const };
-    expect(against_goal(passes, { h95_m: 0.2, v95_m: 0.4 }, own).status).toBe('within_goal');
-    expect(over_goal_words({ ...passes, anchor: '0x2' }, null, own)).toBe('over the target of its flight, σ 0.030 m');
+    expect(as_shown({ ...far, gates: [...far.gates, held] }, p).status).toBe('estimating');
   });
   it('never when its time ran out, nor when the flight ended before: given up is not green', () => {
     for (const p of [flight([task('0x1', true, false)]), flight([task('0x1', false, false)], 'aborted')]) {
@@ -114,36 +110,5 @@ describe('the likelier of two solutions', () => {
     expect(e.enu_m).toEqual([0, 0, 6]);
     expect(e.ellipse95!.azimuth_deg).toBe(20);
     expect(e.cov_enu_m2![1]).toBe(1);
-  });
-});
-
-describe('an anchor of a calibration', () => {
-  const limits = { h95_m: 0.2, v95_m: 0.4 },
-    of = (status: string, h95_m: number | null, v95_m: number | null) => ({
-      ...anchor('0x1', 'estimating'),
-      status: status as 'passes' | 'withheld',
-      h95_m,
-      v95_m,
-    }),
-    look = (h95_m: number | null, v95_m: number | null) =>
-      STATUS_LOOK[against_goal(of('passes', h95_m, v95_m), limits).status];
-  it('is green within the goal, amber over it or where its accuracy is not known', () => {
-    expect(look(0.2, 0.4)[1]).toBe('ok');
-    for (const [h, v] of [
-      [3.4, 0.1],
-      [0.1, 0.81],
-      [null, 0.1],
-    ] as const)
-      expect(look(h, v)[1]).toBe('caution');
-    expect(over_goal_words(of('passes', 3.4, 0.81), limits)).toBe('over the goal 0.20 m');
-    expect(over_goal_words(of('passes', 0.1, 0.81), limits)).toBe('over the vertical goal 0.40 m');
-  });
-  it('is never green where nobody named a goal, and withheld whatever its accuracy', () => {
-    expect(STATUS_LOOK[against_goal(of('passes', 0.01, 0.01), null).status][1]).not.toBe('ok');
-    expect(against_goal(of('withheld', 0.01, 0.01), limits).status).toBe('withheld');
-  });
-  it('has the goal that the live estimates were held against', () => {
-    expect(accuracy_goal([anchor('0x1', 'estimating')])?.h95_m).toBe(0.25);
-    expect(accuracy_goal([{ ...anchor('0x1', 'estimating'), gates: [] }])).toBeNull();
   });
 });

@@ -72,20 +72,45 @@ Estimate known_within(double h95_m, double v95_m) {
   return estimate;
 }
 
+AnchorGoal bounds(double h95_m, double v95_m) { return {.bounds = {h95_m, v95_m}}; }
+
+TEST(AccuracyGoal, IsTheAnchorsOwnTargetThenThePlansThenTheSites) {
+  const NetworkId own{1}, other{2};
+  const AccuracyGoal site{.h95_m = 0.3, .v95_m = 0.6};
+  const std::vector<PlanTargets> flown{{.sigma_m = 0.05}, {.sigma_m = 0.1, .of_anchor = {{own, 3}}}};
+  EXPECT_EQ(anchor_goal(own, flown, site), (AnchorGoal{GoalSource::anchor_target, 3, site}))
+      << "of an older flight, before the plan of the newest";
+  EXPECT_EQ(anchor_goal(other, flown, site), (AnchorGoal{GoalSource::plan_target, 0.05, site}));
+  EXPECT_EQ(anchor_goal(own, std::vector<PlanTargets>{{}}, site), (AnchorGoal{GoalSource::site, {}, site}));
+  EXPECT_EQ(anchor_goal(own, {}, {}).source, GoalSource::standard);
+}
+
+TEST(AccuracyGoal, OfATargetIsTheSigmaOfThePositionAloneWhateverTheSiteWants) {
+  auto estimate = known_within(5, 5);
+  estimate.best->covariance_m2 = Eigen::Vector3d(4, 3, 2).asDiagonal();  // trace 9
+  assess_goal(estimate, {GoalSource::anchor_target, 3, {}});
+  ASSERT_EQ(estimate.gates.size(), 2U);
+  EXPECT_EQ(estimate.gates[1].name, "target_sigma_m");
+  EXPECT_EQ(estimate.gates[1].value, 3.0);
+  EXPECT_TRUE(reached_goal(estimate));
+  assess_goal(estimate, {GoalSource::plan_target, 2.999, {}});
+  EXPECT_FALSE(reached_goal(estimate));
+}
+
 TEST(AccuracyGoal, IsReachedOnlyWhenBothBoundsAreWithinIt) {
   for (const auto& [h95_m, v95_m, reached] :
        {std::tuple{0.2, 0.4, true}, {0.201, 0.1, false}, {0.1, 0.401, false}, {0.05, 0.05, true}}) {
     auto estimate = known_within(h95_m, v95_m);
-    assess_goal(estimate, {.h95_m = 0.2, .v95_m = 0.4});
+    assess_goal(estimate, bounds(0.2, 0.4));
     EXPECT_EQ(reached_goal(estimate), reached) << h95_m << ' ' << v95_m;
   }
 }
 
 TEST(AccuracyGoal, IsJudgedAnewNotTwice) {
   auto estimate = known_within(0.3, 0.3);
-  assess_goal(estimate, {.h95_m = 0.2, .v95_m = 0.4});
+  assess_goal(estimate, bounds(0.2, 0.4));
   EXPECT_FALSE(reached_goal(estimate));
-  assess_goal(estimate, {.h95_m = 0.5, .v95_m = 0.5});
+  assess_goal(estimate, bounds(0.5, 0.5));
   EXPECT_EQ(estimate.gates.size(), 3U);
   EXPECT_TRUE(reached_goal(estimate));
 }

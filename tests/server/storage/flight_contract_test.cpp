@@ -89,8 +89,11 @@ TEST_P(FlightStoreContract, KeepsTheNewestStateOfAProcedureUntilItIsForgotten) {
   ASSERT_TRUE(plans().keep_procedure(m.id, "{\"step\":1}", k_noon));
   ASSERT_TRUE(plans().keep_procedure(m.id, "{\"step\":2}", k_noon));
   EXPECT_THAT(plans().procedures().value(), ElementsAre(Pair(m.id, "{\"step\":2}")));
+  EXPECT_EQ(plans().procedure(m.id).value(), "{\"step\":2}");
+  EXPECT_EQ(plans().procedure(MissionId{}).value(), "") << "of another mission";
   ASSERT_TRUE(plans().keep_procedure(m.id, "", k_noon));
   EXPECT_TRUE(plans().procedures().value().empty());
+  EXPECT_EQ(plans().procedure(m.id).value(), "");
   EXPECT_EQ(plans().keep_procedure(MissionId{}, "{}", k_noon).error().code, Errc::not_found);
 }
 

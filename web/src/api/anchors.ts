@@ -17,6 +17,7 @@ import {
   type Mirror,
 } from '../live/messages';
 import { ellipse_from_covariance, enu_from_geodetic } from '../map/enu';
+import { gate_value } from '../ui/gates';
 import { api_url, request } from './client';
 import { newest_summary } from './calibrations';
 import { call, list, type Wire } from './contract';
@@ -27,7 +28,14 @@ export interface Budget {
   readonly shares: readonly { readonly source: string; readonly share: number }[];
   readonly help: string; ///< what would help most, in words
 }
+/// The limits by which the accuracy of an anchor is assessed, from the server: it has one rule for every place that shows it.
+export interface AnchorGoal {
+  readonly words: string; ///< which goal it is, with its limits
+  readonly reached: boolean;
+  readonly limits: readonly Gate[];
+}
 export interface AnchorRow extends EstimateMsg {
+  readonly goal: AnchorGoal | null; ///< null of a running estimate, whose gates have its limits
   readonly acceptable: boolean | null; ///< verdict ok and every gate passed; null where none were run
   readonly contradiction: string; ///< how a later flight contradicts the published place; else empty
   readonly budget: Budget | null;
@@ -46,6 +54,7 @@ export interface AnchorRow extends EstimateMsg {
 
 export const row_of_estimate = (e: EstimateMsg): AnchorRow => ({
   ...e,
+  goal: null,
   name: '',
   absolute_h95_m: null,
   absolute_v95_m: null,
@@ -72,6 +81,18 @@ function budget_of(v: unknown): Budget | null {
     .sort((a, b) => b.share - a.share);
   return { shares, help: str(o.help_text) };
 }
+function goal_of(v: unknown): AnchorGoal | null {
+  const o = obj(v);
+  return o && { words: str(o.words), reached: o.reached === true, limits: gates_of(o.limits) };
+}
+/// How the position is over its goal; empty within it, and where no goal is known.
+export const over_goal_words = (r: AnchorRow): string =>
+  r.goal === null || r.goal.reached
+    ? ''
+    : `over the ${r.goal.words}: ${r.goal.limits
+        .filter((g) => !g.passed)
+        .map(gate_value)
+        .join(', ')}`;
 const point = (v: unknown): { lon: number | null; lat: number | null; h_m: number | null } => {
   const c = vec3(obj(v)?.coordinates ?? v);
   return { lon: c?.[0] ?? null, lat: c?.[1] ?? null, h_m: c?.[2] ?? null };
@@ -101,12 +122,14 @@ function crs_words(v: unknown): string {
     .join(', ');
 }
 
-/// An anchor of a calibration has no status: it passes its gates or is withheld, as the report says. Null: the server's word stands.
-function status_of(status: string, verdict: string, acceptable: unknown): AnchorStatus | null {
+/// An anchor of a calibration has no status: it passes its gates or is withheld, as the report says, and one that passes is green only within its
+/// goal. Null: the server's word stands.
+function status_of(status: string, verdict: string, acceptable: unknown, goal: AnchorGoal | null): AnchorStatus | null {
   if ((STATUS as readonly string[]).includes(status)) return null;
   if (status === 'contradicted') return 'moved';
   if (verdict === 'ambiguous') return 'ambiguous';
-  return verdict === 'ok' && acceptable !== false ? 'passes' : 'withheld';
+  if (verdict !== 'ok' || acceptable === false) return 'withheld';
+  return goal === null ? 'passes' : goal.reached ? 'within_goal' : 'over_goal';
 }
 
 /// `properties` of a GeoJSON feature or one anchor of a calibration; `geometry` beside it.
@@ -142,10 +165,12 @@ export function row_of(p: Record<string, unknown>, geometry: unknown): AnchorRow
     probability: p.probability,
   });
   if (!base) return null;
-  const other_side = mirror_of(p.mirror);
+  const other_side = mirror_of(p.mirror),
+    goal = goal_of(p.goal);
   return {
     ...base,
-    status: status_of(status, verdict, quality?.acceptable) ?? base.status,
+    status: status_of(status, verdict, quality?.acceptable, goal) ?? base.status,
+    goal,
     ellipse95: ellipse(relative?.ellipse95) ?? (cov && ellipse_from_covariance(cov)),
     mirror: other_side,
     contradiction,

@@ -23,6 +23,10 @@ export class ApiError extends Error {
   }
 }
 
+/// What was asked for is not there (any more), or its name can be none.
+export const is_unknown = (e: unknown): boolean =>
+  e instanceof ApiError && [400, 404, 410, 422].includes(e.problem.status);
+
 export function problem_of(body: unknown, status: number): Problem {
   const o = obj(body);
   const errors = Array.isArray(o?.errors)

@@ -31,6 +31,9 @@ export const handover_url = (id: string): string => api_url(`/missions/${encodeU
 
 export const devices_of = async (id: string): Promise<Devices | null> =>
   (await get('/missions/{id}', at(id))).devices ?? null;
+/// How long its flight took beside the forecast; null where none has ended.
+export const flight_time_of = async (id: string): Promise<Wire<'FlightTime'> | null> =>
+  (await get('/missions/{id}', at(id))).flight_time ?? null;
 /// From the mission that has them: control of that one is taken for it, and given back.
 export async function take_devices(id: string, from: string): Promise<void> {
   const { key } = await take_control(from, false);

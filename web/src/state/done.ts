@@ -1,9 +1,7 @@
-/// When an anchor is done, in one place, so that no two counts on a screen differ. The limits are the server's: the accuracy goal in the gates of an
-/// estimate, and, where a procedure flies, the target it works towards. No DOM.
+/// When an anchor is done, in one place, so that no two counts on a screen differ. The limits are the server's, in the gates of an estimate: the target
+/// of the plan that is flown, else the goal of the site. No DOM.
 import type { AnchorTask, ProcedureMsg } from '../live/flight_messages';
 import type { EstimateMsg, MissionMsg } from '../live/messages';
-import { sigma_position } from '../map/enu';
-import { fixed } from '../ui/format';
 import { is_goal } from '../ui/gates';
 import type { Scene } from './scene';
 
@@ -47,25 +45,17 @@ export function likelier<T extends EstimateMsg>(e: T): T {
   };
 }
 
-/// One limit for an anchor: where a procedure works towards a target, its own or the plan's, that is its goal, and the site's is not asked.
-function by_target(e: EstimateMsg, p: ProcedureMsg | null | undefined): EstimateMsg {
-  const goal = goal_of(e, p);
-  if (goal?.of !== 'sigma' || !e.gates.length) return e;
-  const others = e.gates.filter((g) => !is_goal(g)),
-    reached = task_of(p, e.anchor)?.reached === true,
-    value = sigma_position(e.cov_enu_m2),
-    passed = reached || (value !== null && value <= goal.limit_m),
-    done = reached && e.status === 'estimating' && e.verdict === 'ok' && others.every((g) => g.passed);
-  return {
-    ...e,
-    status: done ? 'converged' : e.status,
-    gates: [...others, { name: 'target_sigma_m', value, limit: goal.limit_m, passed, why: '' }],
-  };
+/// What the procedure reached stays reached, also where the running estimate leaves its target again for a moment.
+function by_task(e: EstimateMsg, p: ProcedureMsg | null | undefined): EstimateMsg {
+  if (task_of(p, e.anchor)?.reached !== true) return e;
+  const gates = e.gates.map((g) => (is_goal(g) ? { ...g, passed: true } : g)),
+    done = e.status === 'estimating' && e.verdict === 'ok' && gates.length > 0 && gates.every((g) => g.passed);
+  return { ...e, status: done ? 'converged' : e.status, gates };
 }
 /// The estimate with the status that is shown. While the aircraft still works on an anchor it is not done, and what ran out of time, points or
 /// battery, by a person, or by the end of the flight was given up: neither is ever green. What a person accepted in flight reads so.
 export function as_shown(given: EstimateMsg, p: ProcedureMsg | null | undefined): EstimateMsg {
-  const e = by_target(likelier(given), p);
+  const e = by_task(likelier(given), p);
   const task = task_of(p, e.anchor);
   if (task?.accepted && e.status !== 'ambiguous' && e.status !== 'moved') return { ...e, status: 'accepted' };
   if (!task || task.reached || e.status === 'accepted' || e.status === 'moved' || e.status === 'ambiguous') return e;
@@ -107,45 +97,14 @@ export function task_reason(p: ProcedureMsg | null | undefined, anchor: string):
   return t && !t.reached ? t.why : '';
 }
 
-/// What the convergence of an anchor is measured by, and its limit; null where the server gave none.
+/// What the convergence of an anchor is measured by, and its limit, as the server holds the estimate against it; null where it gave none.
 export interface Goal {
   readonly of: 'sigma' | 'h95';
   readonly limit_m: number;
 }
-export function goal_of(e: EstimateMsg | null, p: ProcedureMsg | null | undefined): Goal | null {
-  const task = e && task_of(p, e.anchor),
-    wanted_m = task && (task.target_sigma_m ?? p?.target_sigma_m);
-  if (wanted_m != null) return { of: 'sigma', limit_m: wanted_m };
-  const gate = e?.gates.find((g) => g.name === 'goal_h95_m');
-  return gate?.limit == null ? null : { of: 'h95', limit_m: gate.limit };
-}
-
-/// The accuracy goal of the server. A calibration does not name it; the gates of the live estimates do.
-export interface AccuracyGoal {
-  readonly h95_m: number;
-  readonly v95_m: number;
-}
-export function accuracy_goal(estimates: readonly EstimateMsg[]): AccuracyGoal | null {
-  const limit = (name: string): number | undefined =>
-      estimates.flatMap((e) => e.gates).find((g) => g.name === name && g.limit !== null)?.limit ?? undefined,
-    [h95_m, v95_m] = [limit('goal_h95_m'), limit('goal_v95_m')];
-  return h95_m === undefined && v95_m === undefined ? null : { h95_m: h95_m ?? Infinity, v95_m: v95_m ?? Infinity };
-}
-/// Of the calibration an anchor that passes its gates is green only within the goal: the target of its flight, else the server's.
-export function against_goal<T extends EstimateMsg>(e: T, goal: AccuracyGoal | null, p?: ProcedureMsg | null): T {
-  if (e.status !== 'passes' || (!goal && goal_of(e, p)?.of !== 'sigma')) return e;
-  return { ...e, status: over_goal_words(e, goal, p) ? 'over_goal' : 'within_goal' };
-}
-/// Which goal it is over, and its limit; empty within. What is not known is not within.
-export function over_goal_words(e: EstimateMsg, goal: AccuracyGoal | null, p?: ProcedureMsg | null): string {
-  const target = goal_of(e, p);
-  if (target?.of === 'sigma')
-    return (sigma_position(e.cov_enu_m2) ?? Infinity) > target.limit_m
-      ? `over the target of its flight, σ ${fixed(target.limit_m, 3)} m`
-      : '';
-  if (!goal) return '';
-  const over_h = (e.h95_m ?? Infinity) > goal.h95_m,
-    over_v = (e.v95_m ?? Infinity) > goal.v95_m;
-  if (over_h) return `over the goal ${fixed(goal.h95_m, 2)} m`;
-  return over_v ? `over the vertical goal ${fixed(goal.v95_m, 2)} m` : '';
+export function goal_of(e: EstimateMsg | null): Goal | null {
+  const limit = (name: string): number | null => e?.gates.find((g) => g.name === name)?.limit ?? null,
+    [sigma_m, h95_m] = [limit('target_sigma_m'), limit('goal_h95_m')];
+  if (sigma_m !== null) return { of: 'sigma', limit_m: sigma_m };
+  return h95_m === null ? null : { of: 'h95', limit_m: h95_m };
 }

@@ -4,16 +4,18 @@ import { useEffect } from 'preact/hooks';
 import { link, toast } from '../state/store';
 import { load_compare, load_publish } from '../views/dialog_chunks';
 import { Live } from '../views/live';
+import { address_of } from './address';
 import { AlarmLine } from './alarm_line';
 import { Help, load_help } from './help';
 import { help_open } from './help_state';
 import { Icon, Mark } from './marks';
 import { load_sign_in, SignIn } from './sign_in';
 import { Strip } from './strip';
+import { Unknown } from './unknown';
 import { useLater } from './use_later';
 
 /// `#/live`, `#/plan/<id>`, `#/anchors`, `#/anchors/0x6a2f`, `#/measurements`, `#/models`,
-/// `#/models/runs/<id>?compare=<id>,<id>`, `#/replay/<mission>?t=12.5`, `#/system`.
+/// `#/models/runs/<id>?compare=<id>,<id>`, `#/replay/<mission>?t=12.5`, `#/system`; address.ts reads them.
 export const route = signal(location.hash);
 addEventListener('hashchange', () => (route.value = location.hash));
 
@@ -125,11 +127,8 @@ const PREFETCH_AFTER_MS = 4000; // the first view has its data and its map by th
 const AGES: ReadonlySet<View> = new Set(['live', 'anchors', 'measurements', 'models', 'system']);
 
 export function App() {
-  const [, name, ...args] = route.value.replace(/^#\/?/, '/').split('/'),
-    arg = args[args.length - 1];
-  const beside = name === 'import' || name === 'guide' ? name : null, // pages that the rail does not show
-    view: View | null = beside ? null : (VIEWS.find(([id]) => id === name)?.[0] ?? 'live'),
-    named = arg ? decodeURIComponent(arg) : null,
+  const { page, named } = address_of(route.value),
+    view: View | null = VIEWS.find(([id]) => id === page)?.[0] ?? null, // the rail shows not every page
     lost = link.value === 'lost' && view !== null && AGES.has(view);
   usePrefetch();
   return (
@@ -151,14 +150,25 @@ export function App() {
         </div>
         <div class="view">
           {view === 'live' && <Live />}
-          {beside === 'import' && <Later load={load_import} props={{}} />}
-          {beside === 'guide' && <Later load={load_guide} props={{ page: named }} />}
+          {page === null && (
+            <div class="empty">
+              <h1 class="sr">Not found</h1>
+              <Unknown what="page" id={route.value} where="is in this dashboard">
+                or choose a view from the bar.
+              </Unknown>
+              <a class="btn" href="#/live">
+                Go to Live
+              </a>
+            </div>
+          )}
+          {page === 'import' && <Later load={load_import} props={{}} />}
+          {page === 'guide' && <Later load={load_guide} props={{ page: named }} />}
           {view === 'plan' && <Later load={load_plan} props={{ id: named }} />}
           {view === 'anchors' && <Later load={load_anchors} props={{ anchor: named }} />}
           {view === 'measurements' && <Later load={load_measurements} props={{}} />}
           {view === 'replay' && <Later load={load_replay} props={{ id: named }} />}
           {view === 'system' && <Later load={load_system} props={{ part: named }} />}
-          {view === 'models' && <Later load={load_models} props={{ path: args[0] === 'runs' ? named : null }} />}
+          {view === 'models' && <Later load={load_models} props={{ path: named }} />}
         </div>
       </main>
       <SignIn />

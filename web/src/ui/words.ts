@@ -20,7 +20,7 @@ export const SOURCE_WORDS: Record<string, string> = {
   base: 'base station',
   floor: 'what no residual shows',
 };
-const sentence = (text: string): string =>
+export const sentence = (text: string): string =>
   text ? `${text[0]!.toUpperCase()}${text.slice(1)}${/[.!?]$/.test(text) ? '' : '.'}` : '';
 const DONE: ReadonlySet<AnchorStatus> = new Set(['converged', 'accepted', 'passes', 'within_goal', 'over_goal']);
 /// Title and sentence of "why not done"; null when there is nothing to explain. `task`: what the procedure says of it, empty where it is content.

@@ -1,9 +1,9 @@
-import type { AnchorRow, Budget } from '../api/anchors';
+import { over_goal_words, type AnchorRow, type Budget } from '../api/anchors';
 import { age, accuracy, bearing, date, dms, fixed, latlon, metres, percent, plain } from '../ui/format';
 import { CopyBox } from '../ui/copy_box';
 import { Mark, Q, StatusChip } from '../ui/marks';
 import { gate_limit, gate_sentence, gate_value } from '../ui/gates';
-import { why_not_done, SOURCE_WORDS } from '../ui/words';
+import { sentence, why_not_done, SOURCE_WORDS } from '../ui/words';
 import { choice } from './anchor_columns';
 import { AnchorPast } from './anchor_past';
 import { AnchorResiduals } from './anchor_residuals';
@@ -282,6 +282,12 @@ function Gates({ r }: { r: AnchorRow }) {
             ))}
           </tbody>
         </table>
+      )}
+      {r.goal && (
+        <p class="why" data-testid="goal">
+          <Mark shape={r.goal.reached ? 'ok' : 'caution'} tone={r.goal.reached ? 'ok' : 'caution'} />{' '}
+          {r.goal.reached ? `Within the ${r.goal.words}.` : sentence(over_goal_words(r))}
+        </p>
       )}
       {r.override && (
         <p class="why" data-testid="override">

@@ -23,6 +23,7 @@ import {
 import type { MissionMsg } from '../live/messages';
 import { Empty, not_loaded_words } from '../ui/empty';
 import { Icon } from '../ui/marks';
+import { Unknown } from '../ui/unknown';
 import { useLater } from '../ui/use_later';
 import { ColumnPicker } from './anchor_columns';
 import { AnchorTable, sorted_rows } from './anchor_table';
@@ -257,20 +258,31 @@ export function Anchors({ anchor }: { anchor: string | null }) {
         {selected ? (
           <AnchorDetail row={selected} live={live} changed={() => void load_published()} />
         ) : (
-          <p class="why pad" role={looking ? 'status' : undefined} data-testid={looking ? 'unknown-anchor' : undefined}>
-            {!looking
-              ? 'Nothing is selected.'
-              : link.value === 'lost' && !known
-                ? not_loaded_words('lost')
-                : (known || problem.value) && synced.value
-                  ? `No anchor ${linked} is known here: it is neither published nor in range in this flight. Check the address, or choose one from the table.`
-                  : `Looking for anchor ${linked}.`}
-          </p>
+          <Missing anchor={looking ? linked : null} asked={known !== null || problem.value !== null} />
         )}
       </aside>
       {compare_open.value && <Compare />}
       {publish_open.value && mission && <Review mission={mission} />}
     </div>
+  );
+}
+
+/// Beside the table where no anchor is shown; `anchor`: that an address names, `asked`: what is published has been asked for.
+function Missing({ anchor, asked }: { anchor: string | null; asked: boolean }) {
+  if (anchor !== null && asked && synced.value && !(link.value === 'lost' && loaded.value === null))
+    return (
+      <Unknown what="anchor" id={anchor} where="is published or in range in this flight">
+        or choose one from the table.
+      </Unknown>
+    );
+  return (
+    <p class="why pad" role={anchor === null ? undefined : 'status'}>
+      {anchor === null
+        ? 'Nothing is selected.'
+        : link.value === 'lost' && loaded.value === null
+          ? not_loaded_words('lost')
+          : `Looking for anchor ${anchor}.`}
+    </p>
   );
 }
 

@@ -36,7 +36,7 @@ export function Convergence({ anchor }: { anchor: string }) {
   tick.value;
   const scene = watched_scene(),
     history = scene?.history.get(anchor) ?? [],
-    goal = goal_of(scene?.anchors.get(anchor)?.value ?? null, scene?.procedure?.value),
+    goal = goal_of(scene?.anchors.get(anchor)?.value ?? null),
     of = goal?.of ?? 'h95',
     limit_m = goal?.limit_m ?? null;
   const theme = ground.value;

@@ -3,10 +3,10 @@ import { useEffect, useRef, useState } from 'preact/hooks';
 import { idempotency_key, error_text } from '../api/client';
 import {
   calibrate,
-  live_rows,
   moved_since_published,
   newest_calibration,
   note_of,
+  over_goal_words,
   publish,
   report_url,
   type AnchorRow,
@@ -18,8 +18,7 @@ import type { EstimateMsg, MissionMsg } from '../live/messages';
 import { enu_from_geodetic } from '../map/enu';
 import { may } from '../state/session';
 import { keep_draft } from '../state/drafts';
-import { accuracy_goal, against_goal, over_goal_words, type AccuracyGoal } from '../state/done';
-import { current_scene, revision, say, scene_of } from '../state/store';
+import { current_scene, revision, say } from '../state/store';
 import { accuracy, date, fixed } from '../ui/format';
 import { Icon, Mark, StatusChip, STATUS_LOOK } from '../ui/marks';
 import { useDraft } from '../ui/use_draft';
@@ -31,6 +30,7 @@ import { publish_open } from './dialogs';
 import { plan_again } from './plan_again';
 import { draft_key } from './plan/draft';
 import { ReviewAnchor } from './review_anchor';
+import { FlightTime } from './flight/flight_time';
 import { flying } from './flight/words';
 import { LeverArmSigma } from './lever_arm_sigma';
 
@@ -41,15 +41,12 @@ interface Form {
 }
 
 export function Publish({ mission }: { mission: MissionMsg }) {
-  const [made, set_made] = useState<Calibration | null>(null),
-    [goal, set_goal] = useState<AccuracyGoal | null>(null),
+  const [draft, set_draft] = useState<Calibration | null>(null),
     [moved, set_moved] = useState<ReadonlyMap<string, Moved>>(new Map()),
     [problem, set_problem] = useState(''),
     [busy, set_busy] = useState<'' | 'calibrating' | 'publishing' | 'planning'>('calibrating'),
     [picked, pick] = useState<string | null>(null);
-  const flown = scene_of(mission.mission).procedure?.value,
-    solves = may('engineer'),
-    draft = made && { ...made, rows: made.rows.map((r) => against_goal(r, goal, flown)) };
+  const solves = may('engineer');
   const keys = useRef({ calibrate: idempotency_key(), publish: idempotency_key() }),
     [form, change, forget] = useDraft<Form>(`publish/${mission.mission}`, { note: '', reasons: {}, left: {} }),
     { note, reasons, left } = form,
@@ -76,14 +73,8 @@ export function Publish({ mission }: { mission: MissionMsg }) {
               ? await calibrate(mission.mission, keys.current.calibrate, arm_sigma_m)
               : null;
         if (!solved) throw new Error('This flight is not solved yet: an engineer has to calibrate it first.');
-        // Shown in one go: no anchor is green before it is known what it is held against.
-        const [live, elsewhere] = await Promise.all([
-          live_rows(mission.mission).catch(() => []),
-          moved_since_published(solved.id).catch(() => new Map<string, Moved>()),
-        ]);
-        set_goal(accuracy_goal(live));
-        set_moved(elsewhere);
-        set_made(solved);
+        set_moved(await moved_since_published(solved.id).catch(() => new Map<string, Moved>()));
+        set_draft(solved);
       }),
   );
   useEffect(() => {
@@ -148,6 +139,7 @@ export function Publish({ mission }: { mission: MissionMsg }) {
         )}{' '}
         What is published is what facility tools read; the running estimates are not.
       </p>
+      <FlightTime mission={mission.mission} />
       {solves && unseen > 0 && <LeverArmSigma withheld={unseen} busy={busy !== ''} solve={solve_again} />}
       {busy === 'calibrating' && <p role="status">Solving {mission.n_ranges} ranges.</p>}
       {problem && (
@@ -198,7 +190,7 @@ export function Publish({ mission }: { mission: MissionMsg }) {
                     pick={() => pick(r.anchor === picked ? null : r.anchor)}
                     r={r}
                     moved={moved.get(r.anchor)}
-                    over={r.status === 'over_goal' ? over_goal_words(r, goal, flown) : ''}
+                    over={r.status === 'over_goal' ? over_goal_words(r) : ''}
                     reason={reasons[r.anchor]}
                     set_reason={(reason) => change({ reasons: { ...reasons, [r.anchor]: reason } })}
                     left={left[r.anchor]}

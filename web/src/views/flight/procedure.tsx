@@ -7,6 +7,7 @@ import { bearing, fixed } from '../../ui/format';
 import { Chip, Mark, Q } from '../../ui/marks';
 import { Axes, Drawing, line, scale, ticks } from '../chart';
 import { AfterLanding } from './after_landing';
+import { FlightTime } from './flight_time';
 import {
   flying,
   grid_measure,
@@ -73,7 +74,12 @@ export function Procedure() {
       ) : (
         p.reason && <p class="why says">{sentence(p.reason)}</p>
       )}
-      {(p.status === 'done' || p.status === 'aborted') && <AfterLanding mission={p.mission} />}
+      {(p.status === 'done' || p.status === 'aborted') && (
+        <>
+          <FlightTime mission={p.mission} />
+          <AfterLanding mission={p.mission} />
+        </>
+      )}
       {p.ended && flying(p) && p.ended !== p.reason && <p class="why says">Why it returns: {p.ended}.</p>}
       {p.drone?.taken_over && (
         <div class="callout caution">

@@ -1,6 +1,7 @@
 /// The guide, as pages of the product: set up, fly, what each screen means, what to do when something is missing.
 import { useEffect } from 'preact/hooks';
 import './guide.css';
+import { Unknown } from '../../ui/unknown';
 import { page_for, page_of, PAGES, type Block, type Page } from './pages';
 
 /// `Heading`: one below that of the page.
@@ -77,6 +78,11 @@ export function Guide({ page: id }: { page: string | null }) {
         ))}
       </nav>
       <article class="guidepage" tabIndex={0} aria-label={page.title}>
+        {id !== null && page.id !== id && (
+          <Unknown what="page" id={`#/guide/${id}`} where="is in the guide">
+            its first page is shown.
+          </Unknown>
+        )}
         <h1>{page.title}</h1>
         <Blocks blocks={page.blocks} Heading="h2" />
       </article>

@@ -1,9 +1,10 @@
 /// Two to four runs side by side: what each was trained on, what it reaches, and their curves in one drawing.
 import { useEffect, useState } from 'preact/hooks';
-import { error_text } from '../../api/client';
+import { error_text, is_unknown } from '../../api/client';
 import { is_bias, run_numbers, run_page, type Run, type RunNumbers, type Task } from '../../api/learning';
 import { fixed } from '../../ui/format';
 import { Icon } from '../../ui/marks';
+import { Unknown } from '../../ui/unknown';
 import { Axes, Drawing, line, scale, ticks } from '../chart';
 import { run_names } from './words';
 
@@ -96,17 +97,23 @@ const MEASURES: Record<'class' | 'bias', readonly Measure[]> = {
 
 export function Compare({ task, runs, close }: { task: Task; runs: readonly string[]; close: () => void }) {
   const [sides, set_sides] = useState<readonly Side[] | null>(null),
+    [unknown, set_unknown] = useState<readonly string[]>([]),
     [problem, set_problem] = useState('');
   const wanted = runs.join();
   useEffect(() => {
     let gone = false;
     const one = async (id: string): Promise<Side | null> => {
-      const run = await run_page(id);
+      const run = await run_page(id).catch((e: unknown) => {
+        if (is_unknown(e)) return null;
+        throw e;
+      });
       return run && { run, numbers: await run_numbers(run) };
     };
-    Promise.all((wanted ? wanted.split(',') : []).map(one)).then(
+    const ids = wanted ? wanted.split(',') : [];
+    Promise.all(ids.map(one)).then(
       (all) => {
         if (!gone) {
+          set_unknown(ids.filter((_, i) => all[i] === null));
           set_sides(all.filter((s): s is Side => s !== null));
           set_problem('');
         }
@@ -128,6 +135,11 @@ export function Compare({ task, runs, close }: { task: Task; runs: readonly stri
           <Icon name="close" />
         </button>
       </div>
+      {unknown.map((id) => (
+        <Unknown key={id} what="training run" id={id}>
+          the others are compared.
+        </Unknown>
+      ))}
       {problem && (
         <div class="problem" role="status">
           <b>That did not work.</b> {problem}

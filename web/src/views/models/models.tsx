@@ -9,6 +9,7 @@ import { CopyBox } from '../../ui/copy_box';
 import { fixed } from '../../ui/format';
 import { NotLoaded } from '../../ui/empty';
 import { Chip } from '../../ui/marks';
+import { Unknown } from '../../ui/unknown';
 import { BiasPanel } from './bias';
 import { Compare } from './compare';
 import { ConfusionPanel, ThresholdPanel } from './classification';
@@ -120,9 +121,9 @@ export function Models({ path }: { path: string | null }) {
         )}
       </div>
       {unknown && (
-        <div class="problem" role="status" data-testid="unknown-run">
-          <b>No training run {unknown} is stored here.</b> Check the address; another run is shown.
-        </div>
+        <Unknown what="training run" id={unknown}>
+          another run is shown.
+        </Unknown>
       )}
       {problem && (
         <div class="problem" role="status">

@@ -1,7 +1,7 @@
 /// What the Models view looks at: the task, its runs and models, the numbers of the chosen run, and what is compared. Follows running jobs.
 import { signal } from '@preact/signals';
 import { useEffect, useState } from 'preact/hooks';
-import { ApiError, idempotency_key, error_text } from '../../api/client';
+import { error_text, idempotency_key, is_unknown } from '../../api/client';
 import {
   models as fetch_models,
   roll_back,
@@ -47,7 +47,7 @@ export function useModels(path: string | null) {
           else set_unknown(wanted);
         },
         (e: unknown) => {
-          if (e instanceof ApiError && [400, 404, 422].includes(e.problem.status)) set_unknown(wanted);
+          if (is_unknown(e)) set_unknown(wanted);
         },
       );
   }, [wanted]);

@@ -12,6 +12,7 @@ import { current_mission, current_scene, now_ms, tick, watched_lost } from '../.
 import { NotLoaded } from '../../ui/empty';
 import { age } from '../../ui/format';
 import { Icon } from '../../ui/marks';
+import { Unknown } from '../../ui/unknown';
 import { useLater } from '../../ui/use_later';
 import { PlanNotice } from '../flight/plan_notice';
 import { CheckPanel, Profile } from './check_panel';
@@ -40,9 +41,9 @@ export function Plan({ id }: { id: string | null }) {
         </div>
       )}
       {desk.unknown && (
-        <div class="problem" role="status" data-testid="unknown-plan">
-          <b>No plan {desk.unknown} is stored here.</b> Check the address; another plan is shown.
-        </div>
+        <Unknown what="plan" id={desk.unknown}>
+          another plan is shown.
+        </Unknown>
       )}
       {back_ms !== null && desk.dirty && !theirs && (
         <div class="callout" role="status" data-testid="brought-back">

@@ -30,6 +30,7 @@ import { STATUS_LOOK } from '../flight/words';
 import { EventRow } from '../events';
 import { RangeList } from '../range_list';
 import { not_loaded_words } from '../../ui/empty';
+import { Unknown } from '../../ui/unknown';
 import { useStable } from '../../ui/use_stable';
 
 const SPEEDS = [0.25, 0.5, 1, 2, 4, 8, 16] as const;
@@ -162,18 +163,20 @@ export function Replay({ id }: { id: string | null }) {
     return (
       <div class="empty">
         <h1 class="sr">Replay</h1>
-        <p role="status">
-          {synced.value && link.value !== 'lost'
-            ? id
-              ? 'No flight is stored under this address.'
-              : 'No flight is stored yet: the first one that is flown or imported can be replayed here.'
-            : not_loaded_words(link.value)}
-        </p>
+        {!synced.value || link.value === 'lost' ? (
+          <p role="status">{not_loaded_words(link.value)}</p>
+        ) : wanted ? (
+          <Unknown what="flight" id={wanted}>
+            or choose a flight in System.
+          </Unknown>
+        ) : (
+          <p role="status">No flight is stored yet: the first one that is flown or imported can be replayed here.</p>
+        )}
         <span class="ways">
           <a class="btn" href="#/live">
             Go to Live
           </a>
-          {!id && may('operator') && (
+          {!wanted && may('operator') && (
             <a class="btn" href="#/import">
               Import a flight
             </a>

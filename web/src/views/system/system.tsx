@@ -7,6 +7,7 @@ import { system } from '../../state/store';
 import { NotLoaded, useLoad } from '../../ui/empty';
 import { bytes, fixed, grouped } from '../../ui/format';
 import { Chip } from '../../ui/marks';
+import { Unknown } from '../../ui/unknown';
 import { AccessPanel, AuditPanel } from './access';
 import { BasePanel } from './base';
 import { DevicesPanel } from './devices';
@@ -22,6 +23,11 @@ export function System({ part }: { part: string | null }) {
   return (
     <div class="system" data-testid="system" tabIndex={0} role="region" aria-label="System">
       <h1 class="sr">System</h1>
+      {part !== null && part !== 'connect' && (
+        <Unknown what="page" id={`#/system/${part}`} where="is in this dashboard">
+          System is shown.
+        </Unknown>
+      )}
       <DevicesPanel guided={part === 'connect'} />
       <BasePanel />
       <LeverPanel />
