@@ -179,6 +179,7 @@ Json flight_provenance(const FlightData& flight, const FlightSolution& s) {
   for (const auto& one : s.shared.lever_up_by_antenna)
     antennas.push_back(
         {{"tag", to_string(one.tag)}, {"antenna", one.antenna}, {"lever_up_m", valued(one.up_m)}});
+  const auto& arm = s.shared.lever_arm_sigma_m;
   return {{"mission", to_string(flight.mission.id)},
           {"name", flight.mission.name},
           {"kit", flight.mission.kit},
@@ -187,6 +188,7 @@ Json flight_provenance(const FlightData& flight, const FlightSolution& s) {
           {"lag_s", valued(s.shared.lag_s)},
           {"lever_up_m", valued(s.shared.lever_up_m)},
           {"lever_up_by_antenna", std::move(antennas)},
+          {"lever_arm_sigma_m", arm ? Json(*arm) : Json(nullptr)},
           {"bias_determined", s.shared.bias_determined},
           {"n_fixes", s.n_fixes},
           {"n_ranges", s.n_ranges},

@@ -156,7 +156,15 @@ export function Publish({ mission }: { mission: MissionMsg }) {
         )}{' '}
         What is published is what facility tools read; the running estimates are not.
       </p>
-      {solves && unseen > 0 && <LeverArmSigma withheld={unseen} busy={busy !== ''} solve={solve_again} />}
+      {solves && draft && (unseen > 0 || draft.lever_arm_sigma_m !== null) && (
+        <LeverArmSigma
+          key={draft.id}
+          withheld={unseen}
+          held_m={draft.lever_arm_sigma_m}
+          busy={busy !== ''}
+          solve={solve_again}
+        />
+      )}
       {busy === 'calibrating' && <p role="status">Solving {mission.n_ranges} ranges.</p>}
       {problem && (
         <div class="problem" role="status">

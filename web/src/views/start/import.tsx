@@ -174,12 +174,16 @@ function Mapping({ found, back }: { found: Found; back: () => void }) {
       epoch_ms: Date.now(),
       point: 'gnss_antenna',
       lever_arm_m: [0, 0, 0],
+      lever_arm_sigma_m: null,
       tag: '',
       ...declared?.about,
     })),
+    [arm_sigma, set_arm_sigma] = useState(about.lever_arm_sigma_m?.toString() ?? ''),
     [share, set_share] = useState<number | null>(null),
     [problem, set_problem] = useState('');
   const missing = [...missing_track(tc), ...missing_ranges(rc)],
+    sigma_m = arm_sigma.trim() === '' ? null : Number(arm_sigma.replace(',', '.')),
+    bad_sigma = sigma_m !== null && !(sigma_m > 0), // how much is too much the server says
     needs_tag = !rc.tag && !/^(0x[0-9a-f]+|[0-9]+)$/i.test(about.tag),
     units = {
       track: time_unit(track, tc.time),
@@ -189,7 +193,7 @@ function Mapping({ found, back }: { found: Found; back: () => void }) {
   const send = async (): Promise<void> => {
     set_problem('');
     try {
-      const flight = flight_of(track, tc, ranges, rc, units, about, declared);
+      const flight = flight_of(track, tc, ranges, rc, units, { ...about, lever_arm_sigma_m: sigma_m }, declared);
       if (!flight.fixes.length || !flight.ranges.length)
         throw new Error(flight.refused[0] ?? 'There is not one position and one range in it.');
       set_share(0);
@@ -303,6 +307,19 @@ function Mapping({ found, back }: { found: Found; back: () => void }) {
             )}
           </>
         )}
+        {about.point !== 'tag_antenna' && (
+          <label>
+            <span class="lab">How well that was measured, one sigma, m</span>
+            <input
+              value={arm_sigma}
+              inputMode="decimal"
+              placeholder="not said"
+              aria-invalid={bad_sigma}
+              data-testid="import-arm-sigma"
+              onInput={(e) => set_arm_sigma(e.currentTarget.value)}
+            />
+          </label>
+        )}
       </div>
       {problem && (
         <div class="problem" role="alert" data-testid="import-problem">
@@ -317,7 +334,7 @@ function Mapping({ found, back }: { found: Found; back: () => void }) {
         <button
           class="btn primary"
           data-testid="import-send"
-          disabled={missing.length > 0 || needs_tag || share !== null}
+          disabled={missing.length > 0 || needs_tag || bad_sigma || share !== null}
         >
           {share === null ? 'Import' : `Importing, ${fixed(share * 100, 0)} %`}
         </button>
