@@ -19,21 +19,10 @@ inline constexpr const char* k_goal_v95 = "goal_v95_m";
 
 inline bool is_goal(const Gate& gate) { return gate.name == k_goal_h95 || gate.name == k_goal_v95; }
 
-/// Puts the two gates of the goal last among the estimate's gates, in place of older ones.
-inline void assess_goal(Estimate& estimate, const AccuracyGoal& goal) {
-  std::erase_if(estimate.gates, is_goal);
-  const auto add = [&](const char* name, double value, double limit) {
-    Gate gate;
-    gate.name = name;
-    gate.limit = limit;
-    if (estimate.best) gate.value = value;
-    gate.passed = estimate.best && value <= limit;
-    if (!estimate.best) gate.why = "there is no position yet";
-    estimate.gates.push_back(std::move(gate));
-  };
-  add(k_goal_h95, estimate.h95_m, goal.h95_m);
-  add(k_goal_v95, estimate.v95_m, goal.v95_m);
-}
+/// Puts the two gates of the goal last among the estimate's gates, in place of older ones. Where the goal
+/// alone is missed, the reason says by how much, what the largest part of the uncertainty is and what would
+/// help.
+void assess_goal(Estimate& estimate, const AccuracyGoal& goal);
 
 /// The first gate that holds the position back whatever its accuracy; none: nullptr.
 inline const Gate* holding_back(const Estimate& estimate) {

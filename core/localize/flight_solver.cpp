@@ -10,6 +10,7 @@
 #include "core/localize/flight_verdict.hpp"
 #include "core/localize/joint_model.hpp"
 #include "core/localize/kit_prior.hpp"
+#include "core/localize/region_reason.hpp"
 #include "core/localize/scatter_doubt.hpp"
 #include "core/localize/sector_doubt.hpp"
 #include "core/localize/unplaced.hpp"
@@ -251,6 +252,7 @@ FlightSolution describe(Work& work, const FlightData& flight) {
       gates.insert(gates.end(), work.checks.begin(), work.checks.end());
       if (!work.unseen_arm.empty()) gates.push_back(work.unseen_arm[i]);
       anchor.budget = std::move(budgets[i]);
+      name_largest_part(anchor.estimate, *anchor.budget);
     }
     anchor.search = std::move(work.start.searches[i]);
     anchor.estimate.bias_m = solution.shared.bias_m.value + anchor.delay_m.value_or(0.0);

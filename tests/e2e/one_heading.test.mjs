@@ -86,6 +86,14 @@ test('a flight that declares the sigma of its lever arm is accepted without bein
   assert.equal(await id('lever-arm-sigma').getByRole('textbox').inputValue(), '0.03');
   assert.deepEqual(await violations(page), []);
   await picture(page, 'one-heading-declared');
+  // A word of the reviewer comes before that of the flight: what was measured to 3 m makes regions that name it.
+  await id('lever-arm-sigma').getByRole('textbox').fill('3');
+  await id('lever-arm-sigma').getByRole('button', { name: 'Solve again' }).click();
+  await eventually('regions are too wide', async () => /measured to 3\.000 m/.test(await text(id('lever-arm-sigma'))));
+  assert.match(
+    await text(id('draft')),
+    /too wide for its distance; the largest part of its uncertainty is the lever arm \(\d+ %\), and what would help most: measure the lever arm/,
+  );
   assert.deepEqual(seen.errors, []);
   await page.close();
 });

@@ -33,6 +33,7 @@ import { draft_key } from './plan/draft';
 import { ReviewAnchor } from './review_anchor';
 import { flying } from './flight/words';
 import { LeverArmSigma } from './lever_arm_sigma';
+import { largest_part } from './largest_part';
 
 interface Form {
   readonly note: string;
@@ -336,7 +337,10 @@ function DraftRow({
       <td>
         <StatusChip status={r.status} />
         {over && <span class="caution block wrap">{over}</span>}
-        <span class="mut block wrap">{r.verdict === 'ok' ? '' : r.reason || VERDICT_WORDS[r.verdict]}</span>
+        {over && <span class="mut block wrap">{largest_part(r.budget)}</span>}
+        <span class="mut block wrap">
+          {passes(r) ? '' : r.reason || (r.verdict === 'ok' ? '' : VERDICT_WORDS[r.verdict])}
+        </span>
       </td>
       <td class="num">{accuracy(r.h95_m)}</td>
       <td class="num">{accuracy(r.v95_m)}</td>
