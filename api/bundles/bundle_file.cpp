@@ -24,19 +24,22 @@ class FolderSink final : public BundleSink {
     file_ = std::ofstream(folder_.path(table.name), std::ios::binary);
     if (!file_) return failed();
     sum_ = Sha256();
-    text_ = bundle_header(table);
+    text_.clear();
+    width_.reset();
     return boost::outcome_v2::success();
   }
   Result<void> row(const BundleRow& row) override {
     if (++entry_.rows > k_bundle_rows)
       return make_error(Errc::unsupported, "the mission has more than " + std::to_string(k_bundle_rows) +
                                                " rows of " + table_->name + ", and no bundle holds more");
-    text_ += bundle_line(*table_, row);
+    if (!width_) begin_text(&row);
+    text_ += bundle_line(*table_, row, *width_);
     if (text_.size() < k_write_bytes) return boost::outcome_v2::success();
     return flush();
   }
   Result<void> end() {
     if (table_ == nullptr) return boost::outcome_v2::success();
+    if (!width_) begin_text(nullptr);
     BOOST_OUTCOME_TRY(flush());
     file_.close();
     if (!file_) return failed();
@@ -47,6 +50,10 @@ class FolderSink final : public BundleSink {
   }
 
  private:
+  void begin_text(const BundleRow* first) {
+    width_ = bundle_width(*table_, first);
+    text_ = bundle_header(*table_, *width_);
+  }
   Result<void> flush() {
     sum_.add(text_);
     entry_.bytes += text_.size();
@@ -67,6 +74,7 @@ class FolderSink final : public BundleSink {
   std::ofstream file_;
   Sha256 sum_;
   std::string text_;
+  std::optional<std::size_t> width_;  ///< columns, known with the first row
 };
 
 }  // namespace
@@ -108,7 +116,8 @@ Result<void> BundleZipSource::open(const BundleTable& table) {
   lines_ = std::move(lines);
   std::string_view line;
   BOOST_OUTCOME_TRY(const bool more, lines_->next(line));
-  return check_bundle_header(table, more ? line : std::string_view{});
+  BOOST_OUTCOME_TRY(width_, read_bundle_header(table, more ? line : std::string_view{}));
+  return boost::outcome_v2::success();
 }
 
 Result<bool> BundleZipSource::next(BundleRow& row) {
@@ -118,7 +127,7 @@ Result<bool> BundleZipSource::next(BundleRow& row) {
   const std::string at = bundle_entry_name(*table_) + " line " + std::to_string(lines_->number());
   if (lines_->number() > k_bundle_rows + 1)
     return make_error(Errc::invalid_argument, at + " is beyond what a bundle holds");
-  auto read = read_bundle_line(*table_, line);
+  auto read = read_bundle_line(*table_, line, width_);
   if (!read) return make_error(read.error().code, at + ": " + read.error().message);
   row = std::move(read).value();
   return true;

@@ -29,6 +29,7 @@ class BundleZipSource final : public BundleSource {
   const ZipReader& zip_;
   const BundleTable* table_{nullptr};
   std::optional<ZipLines> lines_;
+  std::size_t width_{};  ///< columns of its entry
 };
 
 }  // namespace anchord::api

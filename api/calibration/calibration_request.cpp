@@ -97,7 +97,8 @@ CalibrationRequest read_calibration_request(const Json& body, std::vector<FieldE
   }
   read_height(fields, options, errors);
   if (const auto gap = fields.number("max_gap_s", 0.01, 10)) options.max_gap_s = *gap;
-  options.lever_arm_sigma_m = fields.number("lever_arm_sigma_m", 0.001, 10);
+  options.lever_arm_sigma_m =
+      fields.number("lever_arm_sigma_m", k_least_lever_arm_sigma_m, k_most_lever_arm_sigma_m);
   if (const auto fix = fields.word("min_fix", k_fix_words)) options.min_fix = *fix;
   out.max_correction_age_s = fields.number("max_correction_age_s", 0.1, 3600);
   out.max_speed_mps = fields.number("max_speed_mps", 1, 1000);

@@ -18,6 +18,7 @@
 #include "core/geo/track_check.hpp"
 #include "core/localize/flight_solver.hpp"
 #include "core/localize/fuse.hpp"
+#include "core/localize/region_reason.hpp"
 
 namespace anchord::api {
 
@@ -179,6 +180,7 @@ Json flight_provenance(const FlightData& flight, const FlightSolution& s) {
   for (const auto& one : s.shared.lever_up_by_antenna)
     antennas.push_back(
         {{"tag", to_string(one.tag)}, {"antenna", one.antenna}, {"lever_up_m", valued(one.up_m)}});
+  const auto& arm = s.shared.lever_arm_sigma_m;
   return {{"mission", to_string(flight.mission.id)},
           {"name", flight.mission.name},
           {"kit", flight.mission.kit},
@@ -187,6 +189,7 @@ Json flight_provenance(const FlightData& flight, const FlightSolution& s) {
           {"lag_s", valued(s.shared.lag_s)},
           {"lever_up_m", valued(s.shared.lever_up_m)},
           {"lever_up_by_antenna", std::move(antennas)},
+          {"lever_arm_sigma_m", arm ? Json(*arm) : Json(nullptr)},
           {"bias_determined", s.shared.bias_determined},
           {"n_fixes", s.n_fixes},
           {"n_ranges", s.n_ranges},
@@ -210,9 +213,9 @@ Json noise_provenance(const CalibrationRequest& request, const std::vector<Fligh
 }
 
 /// The budget of an anchor's answer, of several flights through their fusion, with the base's own error.
-Json budget_of(const std::vector<const AnchorSolution*>& flights, const Estimate& fused,
-               const std::optional<double>& base_sigma_m) {
-  if (!fused.best) return nullptr;
+std::optional<ErrorBudget> budget_of(const std::vector<const AnchorSolution*>& flights, const Estimate& fused,
+                                     const std::optional<double>& base_sigma_m) {
+  if (!fused.best) return std::nullopt;
   std::vector<BudgetOf> counted;
   const ErrorBudget* chosen = nullptr;
   for (const auto* flight : flights) {
@@ -221,12 +224,12 @@ Json budget_of(const std::vector<const AnchorSolution*>& flights, const Estimate
     if (e.best->covariance_m2 == fused.best->covariance_m2) chosen = &*flight->budget;
     if (e.verdict == Verdict::ok) counted.push_back({&*flight->budget, e.best->covariance_m2});
   }
-  if (chosen == nullptr && counted.empty()) return nullptr;
+  if (chosen == nullptr && counted.empty()) return std::nullopt;
   // As fuse_estimates: where no flight is ok, the narrowest stands for all.
   ErrorBudget budget = chosen != nullptr ? *chosen : fused_budget(counted, fused.best->covariance_m2);
   if (base_sigma_m)
     budget.part(ErrorSource::base) = *base_sigma_m * *base_sigma_m * Eigen::Matrix3d::Identity();
-  return budget_json(budget, base_sigma_m.has_value());
+  return budget;
 }
 
 /// Misclosures of the surveyed points that the request named.
@@ -268,8 +271,10 @@ Json fuse_anchors(const ByAnchor& by_anchor, const std::optional<double>& base_s
   Json budgets = Json::object();
   for (const auto& [id, estimates] : by_anchor.estimates) {
     Estimate estimate = fuse_estimates(estimates);
-    if (auto budget = budget_of(by_anchor.solutions.at(id), estimate, base_sigma_m); !budget.is_null())
-      budgets[to_string(id)] = std::move(budget);
+    if (const auto budget = budget_of(by_anchor.solutions.at(id), estimate, base_sigma_m)) {
+      name_largest_part(estimate, *budget);
+      budgets[to_string(id)] = budget_json(*budget, base_sigma_m.has_value());
+    }
     if (out.origin) {
       const EnuFrame globe(*out.origin);
       if (estimate.best) estimate.best->wgs84 = globe.wgs84_from_enu(estimate.best->position);

@@ -155,6 +155,8 @@ Ordered flight_json(const SolvedFlight& flight) {
                     {"curve_m_per_efold", valued(s.shared.curve_m)},
                     {"lag_s", valued(s.shared.lag_s)},
                     {"lever_up_m", valued(s.shared.lever_up_m)},
+                    {"lever_arm_sigma_m",
+                     s.shared.lever_arm_sigma_m ? number(*s.shared.lever_arm_sigma_m, 4) : Ordered(nullptr)},
                     {"bias_determined", s.shared.bias_determined},
                     {"bias_z", number(s.shared.bias_z, 2)}};
   json["shared"]["lever_up_by_antenna"] = Ordered::array();

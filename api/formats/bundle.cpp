@@ -186,46 +186,56 @@ Result<BundleManifest> checked_bundle(const ZipReader& zip) {
 
 std::string bundle_entry_name(const BundleTable& table) { return "tables/" + table.name + ".ndjson"; }
 
-std::string bundle_header(const BundleTable& table) {
+std::size_t bundle_width(const BundleTable& table, const BundleRow* first) {
+  std::size_t n = table.columns.size();
+  while (n > 0 && table.columns[n - 1].later &&
+         (first == nullptr || std::holds_alternative<std::monostate>((*first)[n - 1])))
+    --n;
+  return n;
+}
+
+std::string bundle_header(const BundleTable& table, std::size_t n_columns) {
   std::string line = "[";
-  for (const auto& column : table.columns) {
-    if (line.size() > 1) line += ',';
-    append_json_text(line, column.name);
+  for (std::size_t i = 0; i < n_columns; ++i) {
+    if (i > 0) line += ',';
+    append_json_text(line, table.columns[i].name);
   }
   return line + "]\n";
 }
 
-std::string bundle_line(const BundleTable& table, const BundleRow& row) {
+std::string bundle_line(const BundleTable& table, const BundleRow& row, std::size_t n_columns) {
   std::string line = "[";
-  for (std::size_t i = 0; i < row.size(); ++i) {
+  for (std::size_t i = 0; i < n_columns; ++i) {
     if (i > 0) line += ',';
     append_cell(line, row[i], table.columns[i].kind);
   }
   return line + "]\n";
 }
 
-Result<void> check_bundle_header(const BundleTable& table, std::string_view line) {
-  std::string wanted = bundle_header(table);
-  wanted.pop_back();
-  if (line == wanted) return boost::outcome_v2::success();
+Result<std::size_t> read_bundle_header(const BundleTable& table, std::string_view line) {
+  const std::size_t least = bundle_width(table, nullptr);
+  std::string wanted;
+  for (std::size_t n = table.columns.size(); n + 1 > least; --n) {
+    wanted = bundle_header(table, n);
+    wanted.pop_back();
+    if (line == wanted) return n;
+  }
   return make_error(Errc::invalid_argument, bundle_entry_name(table) + " has other columns than " + wanted);
 }
 
-Result<BundleRow> read_bundle_line(const BundleTable& table, std::string_view line) {
+Result<BundleRow> read_bundle_line(const BundleTable& table, std::string_view line, std::size_t n_columns) {
   json value;
   if (const auto error = parse_json(line, value)) return make_error(Errc::invalid_argument, error->detail);
-  if (!value.is_array() || value.size() != table.columns.size())
-    return make_error(Errc::invalid_argument,
-                      "is no array of " + std::to_string(table.columns.size()) + " values");
-  BundleRow row;
-  row.reserve(table.columns.size());
-  for (std::size_t i = 0; i < table.columns.size(); ++i) {
+  if (!value.is_array() || value.size() != n_columns)
+    return make_error(Errc::invalid_argument, "is no array of " + std::to_string(n_columns) + " values");
+  BundleRow row(table.columns.size());
+  for (std::size_t i = 0; i < n_columns; ++i) {
     auto cell = read_cell(value[i], table.columns[i].kind);
     if (!cell)
       return make_error(
           Errc::invalid_argument,
           table.columns[i].name + " is no " + std::string(k_cell_kind_words.word(table.columns[i].kind)));
-    row.push_back(*std::move(cell));
+    row[i] = *std::move(cell);
   }
   return row;
 }

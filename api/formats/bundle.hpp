@@ -45,12 +45,16 @@ Result<BundleManifest> read_bundle_manifest(std::string_view text);
 Result<BundleManifest> checked_bundle(const ZipReader& zip);
 
 std::string bundle_entry_name(const BundleTable& table);
-std::string bundle_header(const BundleTable& table);
-/// With its line end.
-std::string bundle_line(const BundleTable& table, const BundleRow& row);
-/// errors: invalid_argument
-Result<void> check_bundle_header(const BundleTable& table, std::string_view line);
-Result<BundleRow> read_bundle_line(const BundleTable& table, std::string_view line);
+/// Columns of the entry of a table whose first row is this (none: null): without those that came later and
+/// have no value.
+std::size_t bundle_width(const BundleTable& table, const BundleRow* first);
+/// Of the first n columns, with their line end.
+std::string bundle_header(const BundleTable& table, std::size_t n_columns);
+std::string bundle_line(const BundleTable& table, const BundleRow& row, std::size_t n_columns);
+/// Columns of an entry, by its first line. errors: invalid_argument
+Result<std::size_t> read_bundle_header(const BundleTable& table, std::string_view line);
+/// A row of all columns, empty where the entry has none. errors: invalid_argument
+Result<BundleRow> read_bundle_line(const BundleTable& table, std::string_view line, std::size_t n_columns);
 
 /// Lines of an entry, one in memory. errors: those of the zip file; bad_frame where a line is too long
 class ZipLines {

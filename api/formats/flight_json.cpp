@@ -167,7 +167,7 @@ Result<FlightDeclaration> read_flight_json(const std::filesystem::path& file) {
   FlightDeclaration flight;
   std::optional<Error> error;
   Reader r(json, file.string(), error);
-  r.allow({"name", "kit", "radio", "site", "epoch_utc", "track", "tags"});
+  r.allow({"name", "kit", "radio", "site", "epoch_utc", "track", "tags", "lever_arm_sigma_m"});
   flight.mission.name = r.text("name", false);
   flight.mission.kit = r.text("kit", false);
   flight.mission.radio = r.text("radio", false);
@@ -194,6 +194,12 @@ Result<FlightDeclaration> read_flight_json(const std::filesystem::path& file) {
                flight.mission);
     }
   }
+  if (const Json* sigma = r.find("lever_arm_sigma_m"); sigma && !sigma->is_null()) {
+    if (sigma->is_number() && is_lever_arm_sigma(sigma->get<double>()))
+      flight.mission.lever_arm_sigma_m = sigma->get<double>();
+    else
+      r.fail(std::string("'lever_arm_sigma_m' ") + k_lever_arm_sigma_rule);
+  }
   if (error) return *error;
   flight.mission.created = flight.epoch;
   flight.mission.state = MissionState::finished;
@@ -217,6 +223,7 @@ Result<void> write_flight_json(const FlightDeclaration& flight, const std::files
                             {"antenna", std::to_string(tag.antenna)},
                             {"lever_arm_body_m", {arm.x(), arm.y(), arm.z()}}});
   }
+  if (mission.lever_arm_sigma_m) json["lever_arm_sigma_m"] = *mission.lever_arm_sigma_m;
   std::ofstream out(file, std::ios::binary);
   out << to_wire(json, 1) << '\n';
   out.close();

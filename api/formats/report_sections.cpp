@@ -9,6 +9,7 @@
 
 #include "api/formats/report_svg.hpp"
 #include "api/wire/live_writer.hpp"
+#include "core/localize/error_budget.hpp"
 
 namespace anchord::report {
 namespace {
@@ -140,17 +141,10 @@ std::string gate_row(std::span<const ReportAnchor> anchors, const std::string& n
          "</tr>";
 }
 
-/// Where an error comes from, in the words of the dashboard (web/src/ui/words.ts).
+/// Where an error comes from, for people.
 std::string source_words(const std::string& source) {
-  constexpr std::array words{std::pair{"ranging", "noise of the ranges"},
-                             std::pair{"geometry", "geometry of the flight"},
-                             std::pair{"bias", "range bias"},
-                             std::pair{"rtk", "RTK positions"},
-                             std::pair{"clock", "time lag"},
-                             std::pair{"base", "base station"},
-                             std::pair{"floor", "what no residual shows"}};
-  const auto it = std::ranges::find(words, source, [](const auto& w) { return std::string(w.first); });
-  return it == words.end() ? spaced(source) : it->second;
+  const auto known = k_error_source_words.find(source);
+  return known ? std::string(source_text(*known)) : spaced(source);
 }
 
 std::string failures(const ReportAnchor& anchor) {

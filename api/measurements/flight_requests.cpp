@@ -64,6 +64,13 @@ Result<Mission> parse_mission(std::string_view body) {
     BOOST_OUTCOME_TRY(mission.point,
                       k_point_words.parse("track_point", json.at("track_point").get<std::string>()));
     for (const Json& tag : json.at("tags")) mission.tags.push_back(parse_tag(tag));
+    // Absent from servers of before 0.2.
+    if (const auto sigma = json.find("lever_arm_sigma_m"); sigma != json.end() && !sigma->is_null()) {
+      mission.lever_arm_sigma_m = sigma->get<double>();
+      if (!is_lever_arm_sigma(*mission.lever_arm_sigma_m))
+        return make_error(Errc::bad_frame,
+                          std::string("not a mission: lever_arm_sigma_m ") + k_lever_arm_sigma_rule);
+    }
   } catch (const std::exception& error) {
     return make_error(Errc::bad_frame, std::string("not a mission: ") + error.what());
   }
@@ -105,6 +112,7 @@ std::string mission_request_json(const Mission& mission) {
                            {"antenna", tag.antenna},
                            {"lever_arm_body_m", {arm.x(), arm.y(), arm.z()}}});
   }
+  if (mission.lever_arm_sigma_m) out["lever_arm_sigma_m"] = *mission.lever_arm_sigma_m;
   return dumped(out);
 }
 

@@ -34,6 +34,7 @@ Ordered mission_json(const Mission& mission, std::optional<std::uint64_t> n_rang
   out["frame"] = k_frame_words.word(mission.frame);
   out["track_point"] = k_point_words.word(mission.point);
   out["tags"] = std::move(tags);
+  out["lever_arm_sigma_m"] = or_null(mission.lever_arm_sigma_m);
   out["state"] = k_mission_state_words.word(mission.state);
   out["created_at"] = to_rfc3339(mission.created);
   out["finished_at"] = mission.finished ? Ordered(to_rfc3339(*mission.finished)) : Ordered(nullptr);
@@ -84,6 +85,8 @@ Mission read_mission(const Json& body, std::vector<FieldError>& errors) {
       }
     }
   }
+  mission.lever_arm_sigma_m =
+      fields.number("lever_arm_sigma_m", k_least_lever_arm_sigma_m, k_most_lever_arm_sigma_m);
   fields.finish();
   return mission;
 }

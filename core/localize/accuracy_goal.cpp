@@ -4,9 +4,12 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <string_view>
 
 namespace anchord {
 namespace {
+
+constexpr std::string_view k_missed = "not within the accuracy goal: ";
 
 std::string text(const char* format, double a, double b = 0) {
   std::array<char, 120> out{};
@@ -22,6 +25,14 @@ Gate gate(const Estimate& estimate, const char* name, std::optional<double> valu
   out.passed = out.value && *out.value <= limit;
   if (!estimate.best) out.why = "there is no position yet";
   return out;
+}
+
+std::string missed(const Gate& gate) {
+  if (gate.name == k_goal_sigma)
+    return text("sigma of the position %.2f m (target %.2f m)", gate.value.value_or(0), gate.limit);
+  return text(gate.name == k_goal_h95 ? "95 %% horizontal %.2f m (goal %.2f m)"
+                                      : "95 %% vertical %.2f m (goal %.2f m)",
+              gate.value.value_or(0), gate.limit);
 }
 
 }  // namespace
@@ -63,7 +74,17 @@ std::vector<Gate> goal_gates(const Estimate& estimate, const AnchorGoal& goal) {
 
 void assess_goal(Estimate& estimate, const AnchorGoal& goal) {
   std::erase_if(estimate.gates, is_goal);
-  for (auto& one : goal_gates(estimate, goal)) estimate.gates.push_back(std::move(one));
+  if (estimate.reason.starts_with(k_missed)) estimate.reason.clear();
+  const bool free = estimate.verdict == Verdict::ok && estimate.reason.empty() &&
+                    !estimate.largest_part.empty() && holding_back(estimate) == nullptr;
+  for (auto& one : goal_gates(estimate, goal)) {
+    if (estimate.best && !one.passed) {
+      if (free && one.value && estimate.reason.empty())
+        estimate.reason = std::string(k_missed) + missed(one) + "; " + estimate.largest_part;
+      one.why = estimate.largest_part;
+    }
+    estimate.gates.push_back(std::move(one));
+  }
 }
 
 const Gate* holding_back(const Estimate& estimate) {

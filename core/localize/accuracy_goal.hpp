@@ -66,7 +66,8 @@ inline bool is_goal(const Gate& gate) {
 
 /// The estimate against its goal, one gate a limit.
 std::vector<Gate> goal_gates(const Estimate& estimate, const AnchorGoal& goal);
-/// Puts them last among the estimate's gates, in place of older ones.
+/// Puts them last among the estimate's gates, in place of older ones. Where the goal alone is missed, the
+/// reason says by how much, what the largest part of the uncertainty is and what would help.
 void assess_goal(Estimate& estimate, const AnchorGoal& goal);
 
 /// The first gate that holds the position back whatever its accuracy; none: nullptr.

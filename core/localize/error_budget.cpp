@@ -91,6 +91,28 @@ double even_share(const Eigen::Matrix3d& covariance, bool plane) {
 
 }  // namespace
 
+std::string_view source_text(ErrorSource source) {
+  switch (source) {
+    case ErrorSource::ranging:
+      return "noise of the ranges";
+    case ErrorSource::geometry:
+      return "geometry of the flight";
+    case ErrorSource::bias:
+      return "range bias";
+    case ErrorSource::rtk:
+      return "RTK positions";
+    case ErrorSource::lever_arm:
+      return "lever arm";
+    case ErrorSource::clock:
+      return "time lag";
+    case ErrorSource::base:
+      return "base station";
+    case ErrorSource::floor:
+      return "what no residual shows";
+  }
+  return "";
+}
+
 std::string_view help_text(BudgetHelp help) {
   switch (help) {
     case BudgetHelp::more_points:

@@ -23,6 +23,8 @@ inline constexpr auto k_error_source_words = enum_table<ErrorSource>({{"ranging"
                                                                       {"base", ErrorSource::base},
                                                                       {"floor", ErrorSource::floor}});
 inline constexpr std::size_t k_error_sources = k_error_source_words.size();
+/// In words for people: "geometry of the flight".
+std::string_view source_text(ErrorSource source);
 
 /// What would lower it most.
 enum class BudgetHelp : std::uint8_t {

@@ -56,7 +56,8 @@ struct FlightOptions {
   double lever_across_prior_m{0};     ///< body x and y; 0: held at the declared arm. Only where heading and
                                       ///< course differ can it be told from the lag
   /// One sigma of the declared arm's forward and left part, as it was measured; the regions then hold it.
-  /// Absent: unknown, and anchors that a wrong arm would move unseen are held back (unseen_arm.hpp).
+  /// Absent: what each flight's mission declares; where that is nothing either, anchors that a wrong arm
+  /// would move unseen are held back (unseen_arm.hpp).
   std::optional<double> lever_arm_sigma_m{};
   double pair_sigma_m{0.1};              ///< of a range between two anchors, whatever its repeats say
   double pair_bias_prior_m{0.3};         ///< common to all ranges between anchors

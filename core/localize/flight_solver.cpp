@@ -10,6 +10,7 @@
 #include "core/localize/flight_verdict.hpp"
 #include "core/localize/joint_model.hpp"
 #include "core/localize/kit_prior.hpp"
+#include "core/localize/region_reason.hpp"
 #include "core/localize/scatter_doubt.hpp"
 #include "core/localize/sector_doubt.hpp"
 #include "core/localize/unplaced.hpp"
@@ -132,8 +133,10 @@ std::string sentence(const char* format, double a, double b = 0, double c = 0) {
   return text;
 }
 
-/// Where nobody said how the tag hangs and no heading could show it, the regions hold where it may be.
+/// How well the arm is known: as asked for, else as the mission says. Where nobody said how the tag hangs and
+/// no heading could show it, the regions hold where it may be.
 void set_arm_sigma(const FlightData& flight, Work& work) {
+  if (!work.options.lever_arm_sigma_m) work.options.lever_arm_sigma_m = flight.mission.lever_arm_sigma_m;
   if (!flight.mission.tags.empty() || work.rows.point == TrackPoint::tag_antenna ||
       work.rows.track.has_attitude() || work.options.lever_arm_sigma_m)
     return;
@@ -178,6 +181,37 @@ AnchorSolution assessed(Work& work, std::size_t index) {
   return anchor;
 }
 
+/// What the whole kit shares, as the fit has it.
+SharedSolution shared_of(const Work& work) {
+  SharedSolution shared;
+  const auto valued = [&](int i) {
+    return Valued{work.fit.state.shared[i], std::sqrt(std::max(work.fit.shared_covariance(i, i), 0.0))};
+  };
+  shared.bias_m = valued(k_shared_bias);
+  shared.curve_m = valued(k_shared_curve);
+  shared.lag_s = valued(k_shared_lag);
+  shared.lever_up_m = valued(k_shared_lever);
+  for (std::size_t k = 0; k < work.rows.antennas.size(); ++k) {
+    const int own = k_shared_antennas + static_cast<int>(k);
+    Valued up = shared.lever_up_m;
+    if (work.rows.antennas.size() > 1 && own < k_shared_size) {
+      const auto& c = work.fit.shared_covariance;
+      up.value += work.fit.state.shared[own];
+      up.sigma = std::sqrt(
+          std::max(c(k_shared_lever, k_shared_lever) + c(own, own) + 2 * c(k_shared_lever, own), 0.0));
+    }
+    shared.lever_up_by_antenna.push_back({work.rows.antennas[k].tag, work.rows.antennas[k].antenna, up});
+  }
+  if (work.options.lever_across_prior_m > 0) {
+    shared.lever_forward_m = valued(k_shared_forward);
+    shared.lever_left_m = valued(k_shared_left);
+  }
+  shared.lever_arm_sigma_m = work.options.lever_arm_sigma_m;
+  shared.bias_z = work.gate.z;
+  shared.bias_determined = work.options.fixed_bias_m || work.gate.known;
+  return shared;
+}
+
 FlightSolution describe(Work& work, const FlightData& flight) {
   const FlightOptions& options = work.options;
   FlightSolution solution;
@@ -189,29 +223,7 @@ FlightSolution describe(Work& work, const FlightData& flight) {
   if (!unplaced.why.empty()) solution.notes.push_back(unplaced.why);
   solution.notes.insert(solution.notes.end(), flight.notes.begin(), flight.notes.end());
   solution.notes.insert(solution.notes.end(), work.rows.notes.begin(), work.rows.notes.end());
-  const auto valued = [&](int i) {
-    return Valued{work.fit.state.shared[i], std::sqrt(std::max(work.fit.shared_covariance(i, i), 0.0))};
-  };
-  solution.shared.bias_m = valued(k_shared_bias);
-  solution.shared.curve_m = valued(k_shared_curve);
-  solution.shared.lag_s = valued(k_shared_lag);
-  solution.shared.lever_up_m = valued(k_shared_lever);
-  for (std::size_t k = 0; k < work.rows.antennas.size(); ++k) {
-    const int own = k_shared_antennas + static_cast<int>(k);
-    Valued up = solution.shared.lever_up_m;
-    if (work.rows.antennas.size() > 1 && own < k_shared_size) {
-      const auto& c = work.fit.shared_covariance;
-      up.value += work.fit.state.shared[own];
-      up.sigma = std::sqrt(
-          std::max(c(k_shared_lever, k_shared_lever) + c(own, own) + 2 * c(k_shared_lever, own), 0.0));
-    }
-    solution.shared.lever_up_by_antenna.push_back(
-        {work.rows.antennas[k].tag, work.rows.antennas[k].antenna, up});
-  }
-  if (options.lever_across_prior_m > 0) {
-    solution.shared.lever_forward_m = valued(k_shared_forward);
-    solution.shared.lever_left_m = valued(k_shared_left);
-  }
+  solution.shared = shared_of(work);
   if (!work.rows.pairs.empty()) {
     solution.notes.push_back(std::to_string(work.rows.pairs.size()) +
                              " distances between anchors took part in the solve");
@@ -220,8 +232,6 @@ FlightSolution describe(Work& work, const FlightData& flight) {
     solution.notes.push_back(std::to_string(n) +
                              " ranges were weighed by the likelihood of a model, not by the loss");
   }
-  solution.shared.bias_z = work.gate.z;
-  solution.shared.bias_determined = options.fixed_bias_m || work.gate.known;
   if (!solution.shared.bias_determined) {
     solution.notes.push_back(
         sentence("bias not determined by this flight, profile missing: %.3f m with sigma %.3f m (z %.1f)",
@@ -242,6 +252,7 @@ FlightSolution describe(Work& work, const FlightData& flight) {
       gates.insert(gates.end(), work.checks.begin(), work.checks.end());
       if (!work.unseen_arm.empty()) gates.push_back(work.unseen_arm[i]);
       anchor.budget = std::move(budgets[i]);
+      name_largest_part(anchor.estimate, *anchor.budget);
     }
     anchor.search = std::move(work.start.searches[i]);
     anchor.estimate.bias_m = solution.shared.bias_m.value + anchor.delay_m.value_or(0.0);
@@ -267,7 +278,7 @@ Result<void> FlightOptions::check() const {
       positive(bias_prior_m) && positive(calibrated_bias_prior_m) && positive(delay_prior_m) &&
       positive(curve_prior_m) && positive(lag_prior_s) && positive(lever_prior_m) && positive(mad_factor) &&
       positive(min_scale_m) && correlation_s >= 0 && floor_sigma_m >= 0 && min_range_m >= 0 &&
-      max_range_m > min_range_m && (!lever_arm_sigma_m || positive(*lever_arm_sigma_m)) &&
+      max_range_m > min_range_m && (!lever_arm_sigma_m || is_lever_arm_sigma(*lever_arm_sigma_m)) &&
       (!max_gap_s || positive(*max_gap_s)) && positive(track.max_speed_mps) &&
       positive(track.max_acceleration_mps2) && positive(track.max_correction_age_s) &&
       (!anchor_height_m || std::isfinite(*anchor_height_m)) &&
@@ -298,6 +309,9 @@ Result<std::vector<FlightSolution>> solve_flights(std::span<const FlightData* co
   BOOST_OUTCOME_TRY(options.check());
   std::vector<Work> all;
   for (const FlightData* flight : flights) {
+    if (const auto& sigma_m = flight->mission.lever_arm_sigma_m; sigma_m && !is_lever_arm_sigma(*sigma_m))
+      return make_error(Errc::invalid_argument,
+                        flight->mission.name + ": lever_arm_sigma_m " + k_lever_arm_sigma_rule);
     auto rows = flight_rows(*flight, options);
     if (!rows) return make_error(rows.error().code, flight->mission.name + ": " + rows.error().message);
     Work work{.rows = std::move(rows.value())};

@@ -33,6 +33,7 @@ bool LiveAnchor::adopt(const AnchorSolution& solution, const SharedSolution& sha
   std::erase_if(recent_, [&](const Recent& recent) { return recent.time <= cut; });
   joint_.reset();
   estimate_.gates.clear();  // of an answer that no longer counts
+  estimate_.largest_part.clear();
   const Eigen::Matrix3d information = solution.fit_covariance_m2.inverse();
   if (!estimate.best || !information.allFinite() || solution.fit_covariance_m2.trace() <= 0) return false;
   Joint joint;

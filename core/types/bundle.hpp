@@ -20,6 +20,9 @@ inline constexpr auto k_cell_kind_words = enum_table<CellKind>({{"integer", Cell
 struct BundleColumn {
   std::string name;
   CellKind kind{CellKind::text};
+  /// Came when there were bundles already: one at the end of a table of one row, and only where it has a
+  /// value, so that what says nothing in it is the bundle that it was.
+  bool later{false};
 };
 /// One value: nothing, an integer, a real, or (text, bytes, id) a string of bytes. Real values are compared
 /// and carried bit for bit.

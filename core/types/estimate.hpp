@@ -74,6 +74,8 @@ struct Estimate {
   std::optional<double> bias_sigma_m{};
   std::optional<double> lag_s{};
   std::optional<double> lag_sigma_s{};
+  /// The largest part of its error budget and what would help most, in words; empty where none was made.
+  std::string largest_part{};
   std::vector<Gate> gates{};  ///< in the order they were asked; empty in flight, where nothing is accepted
 
   /// May be accepted without a person: verdict ok and every gate passed. Nothing else ever is.

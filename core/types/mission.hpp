@@ -18,6 +18,14 @@ inline constexpr auto k_point_words = enum_table<TrackPoint>({{"gnss_antenna", T
                                                               {"body", TrackPoint::body},
                                                               {"tag_antenna", TrackPoint::tag_antenna}});
 
+/// How well a lever arm may be said to be measured, one sigma: the one rule wherever it is read.
+inline constexpr double k_least_lever_arm_sigma_m = 0.001, k_most_lever_arm_sigma_m = 10;
+inline constexpr const char* k_lever_arm_sigma_rule = "must be 0.001 to 10 m, one sigma of the lever arm";
+/// False of what is no number too.
+constexpr bool is_lever_arm_sigma(double sigma_m) {
+  return sigma_m >= k_least_lever_arm_sigma_m && sigma_m <= k_most_lever_arm_sigma_m;
+}
+
 /// One UWB antenna of the aircraft.
 struct TagAntenna {
   NetworkId tag{};
@@ -41,6 +49,8 @@ struct Mission {
   TrackFrame frame{TrackFrame::wgs84};
   TrackPoint point{TrackPoint::gnss_antenna};
   std::vector<TagAntenna> tags;
+  /// One sigma of the arms' forward and left part, as they were measured; absent: nobody says.
+  std::optional<double> lever_arm_sigma_m{};
   MissionState state{MissionState::recording};
   UtcTime created{};
   std::optional<UtcTime> finished{};

@@ -312,8 +312,9 @@ void add_options(CLI::App& command, Arguments& a) {
   command
       .add_option("--lever-arm-sigma", a.lever_arm_sigma_m,
                   "How well the lever arm was measured, forward and left, one sigma in metres: the regions "
-                  "hold it, and a flight that kept one heading is not held back for it")
-      ->check(CLI::Range(0.001, 10.0));
+                  "hold it, and a flight that kept one heading is not held back for it; default: "
+                  "lever_arm_sigma_m of flight.json")
+      ->check(CLI::Range(k_least_lever_arm_sigma_m, k_most_lever_arm_sigma_m));
   command.add_option("--profile", a.profile, "Kit profile of earlier flights (anchord profile fit)");
 }
 

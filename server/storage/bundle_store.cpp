@@ -369,10 +369,16 @@ class Reader {
     if (uuid_of(row[0]) != mission_.uuid)
       return make_error(Errc::invalid_argument,
                         "the bundle is of mission " + to_string(mission_) + ", its row of another");
-    const auto state = std::ranges::find(spec.columns, "state", &BundleColumnSql::bundle);
-    if (whole_of(row[static_cast<std::size_t>(state - spec.columns.begin())]) ==
-        static_cast<std::int64_t>(MissionState::recording))
+    const auto cell = [&](const char* name) -> const BundleCell& {
+      const auto at = std::ranges::find(spec.columns, name, &BundleColumnSql::bundle);
+      return row[static_cast<std::size_t>(at - spec.columns.begin())];
+    };
+    if (whole_of(cell("state")) == static_cast<std::int64_t>(MissionState::recording))
       return make_error(Errc::invalid_argument, "the mission of a bundle is finished, this one records");
+    const auto* sigma_m = std::get_if<double>(&cell("lever_arm_sigma_m"));
+    if (sigma_m != nullptr && !is_lever_arm_sigma(*sigma_m))
+      return make_error(Errc::invalid_argument,
+                        std::string("lever_arm_sigma_m of the mission ") + k_lever_arm_sigma_rule);
     return boost::outcome_v2::success();
   }
 

@@ -10,7 +10,8 @@ namespace {
 
 /// Columns are "KIND NAME", one after the other: i integer, r real, t text, b bytes, u id; k is the key of a
 /// row of the table NAME, which leaves as its id; c is a real of the impulse response beside a range, and cb
-/// its bytes. "mission" among the columns is the flight itself. Keys ending in ? may be NULL.
+/// its bytes; lr is a real that came later (BundleColumn::later). "mission" among the columns is the flight
+/// itself. Keys ending in ? may be NULL.
 struct Line {
   BundlePart part;
   const char* name;
@@ -53,7 +54,8 @@ constexpr std::array k_lines{
          "d.mission_key = ?1 AND d.kind = 1)",
          "t.anchor_id, t.ordinal"},
     Line{BundlePart::mission, "mission",
-         "u id u site_id t name t kit t radio i frame i track_point i state i created_t_ns i finished_t_ns",
+         "u id u site_id t name t kit t radio i frame i track_point i state i created_t_ns i finished_t_ns "
+         "lr lever_arm_sigma_m",
          "id", k_of_flight, "t.mission_key"},
     Line{BundlePart::measured, "mission_tag",
          "mission i ordinal i tag i antenna r lever_arm_forward_m r lever_arm_left_m r lever_arm_up_m",
@@ -132,7 +134,7 @@ std::vector<std::string> words(std::string_view text) {
 
 CellKind kind_of(const std::string& letter) {
   if (letter == "i") return CellKind::integer;
-  if (letter == "r" || letter == "c") return CellKind::real;
+  if (letter == "r" || letter == "lr" || letter == "c") return CellKind::real;
   if (letter == "b" || letter == "cb") return CellKind::bytes;
   if (letter == "u" || letter == "k") return CellKind::id;
   ANCHORD_CHECK(letter == "t", "no kind of column: " << letter);
@@ -160,7 +162,7 @@ void read_columns(const Line& line, BundleSpec& spec) {
     } else if (letter == "c" || letter == "cb") {
       column = {name, "", "c." + name, ""};
     }
-    spec.table.columns.push_back({column.bundle, kind_of(letter)});
+    spec.table.columns.push_back({column.bundle, kind_of(letter), letter == "lr"});
     spec.columns.push_back(std::move(column));
   }
 }

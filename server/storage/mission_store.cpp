@@ -14,17 +14,17 @@ constexpr const char* k_key =
 constexpr const char* k_id_taken = "SELECT count(*) FROM mission WHERE id = ?1";
 constexpr const char* k_insert =
     "INSERT INTO mission (id, site_id, name, kit, radio, frame, track_point, state, created_t_ns, "
-    "finished_t_ns) "
-    "VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10) RETURNING mission_key";
+    "finished_t_ns, lever_arm_sigma_m) "
+    "VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11) RETURNING mission_key";
 constexpr const char* k_update =
     "UPDATE mission SET site_id = ?2, name = ?3, kit = ?4, radio = ?5, frame = ?6, track_point = ?7, state = "
     "?8, "
-    "created_t_ns = ?9, finished_t_ns = ?10 WHERE id = ?1 RETURNING mission_key";
+    "created_t_ns = ?9, finished_t_ns = ?10, lever_arm_sigma_m = ?11 WHERE id = ?1 RETURNING mission_key";
 constexpr const char* k_finish =
     "UPDATE mission SET state = ?3, finished_t_ns = ?2 WHERE id = ?1 AND state <> ?3 RETURNING mission_key";
 constexpr const char* k_columns =
     "SELECT mission_key, id, site_id, name, kit, radio, frame, track_point, state, created_t_ns, "
-    "finished_t_ns "
+    "finished_t_ns, lever_arm_sigma_m "
     "FROM mission ";
 constexpr const char* k_insert_tag =
     "INSERT INTO mission_tag (mission_key, ordinal, tag, antenna, lever_arm_forward_m, lever_arm_left_m, "
@@ -68,7 +68,8 @@ void store_tags(Connection& connection, std::int64_t key, const Mission& mission
 
 void bind(Query& query, const Mission& m) {
   query << m.id << m.site << m.name << m.kit << m.radio << static_cast<int>(m.frame)
-        << static_cast<int>(m.point) << static_cast<int>(m.state) << m.created << m.finished;
+        << static_cast<int>(m.point) << static_cast<int>(m.state) << m.created << m.finished
+        << m.lever_arm_sigma_m;
 }
 
 Mission read(Connection& connection, Query& query) {
@@ -84,6 +85,7 @@ Mission read(Connection& connection, Query& query) {
   m.state = query.one_of(k_mission_state_words);
   m.created = query.time();
   m.finished = query.maybe_time();
+  m.lever_arm_sigma_m = query.maybe([&] { return query.real(); });
   Query tags(connection, k_tags);
   tags << key;
   while (tags.step()) {

@@ -241,6 +241,37 @@ TEST_F(Bundles, HaveTheSameDigestAsLongAsTheFlightIsTheSame) {
   EXPECT_EQ(digest(), before);
 }
 
+/// The names of the columns of bundles of before missions had a sigma of their lever arms.
+constexpr const char* k_mission_before =
+    R"(["id","site_id","name","kit","radio","frame","track_point","state","created_t_ns","finished_t_ns"])";
+
+TEST_F(Bundles, OfMissionsWithoutALeverArmSigmaAreThoseOfBeforeThereWasOne) {
+  auto entries = entries_of(bundle());
+  const std::string& table = content(entries, "tables/mission.ndjson");
+  EXPECT_EQ(table.substr(0, table.find('\n')), k_mission_before);
+  OtherServer other;
+  ASSERT_EQ(other.take(bundle()).status, 201);
+  EXPECT_EQ(other.stores().missions.mission(id_).value().lever_arm_sigma_m, std::nullopt);
+}
+
+TEST_F(Bundles, CarryTheLeverArmSigmaOfTheirMission) {
+  auto mission = database_->stores().missions.mission(id_).value();
+  mission.lever_arm_sigma_m = 0.03;
+  ASSERT_TRUE(database_->stores().missions.update(mission));
+  OtherServer other;
+  const auto taken = other.take(bundle());
+  ASSERT_EQ(taken.status, 201) << taken.body;
+  EXPECT_EQ(other.stores().missions.mission(id_).value().lever_arm_sigma_m, 0.03);
+  EXPECT_EQ(json(other.get(path("")))["lever_arm_sigma_m"], 0.03);
+  OtherServer third;
+  const auto far = third.take(forged("mission", ",0.03]", ",30.0]"));
+  EXPECT_EQ(far.status, 422) << far.body;
+  EXPECT_NE(far.body.find("0.001 to 10 m"), std::string::npos) << far.body;
+  // The name alone does not make a column.
+  EXPECT_GE(third.take(forged("mission", ",0.03]", "]")).status, 400);
+  expect_nothing(third);
+}
+
 TEST_F(Bundles, BringLaterWordsOfTheFlightToo) {
   OtherServer other;
   ASSERT_EQ(other.take(bundle()).status, 201);

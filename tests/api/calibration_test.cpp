@@ -362,6 +362,42 @@ TEST_F(Calibrations, SayWhatTheUncertaintyOfEachAnchorComesFrom) {
   EXPECT_EQ(json(get("/api/v1/anchors/0x6000"))["properties"]["budget"], based["anchors"][0]["budget"]);
 }
 
+/// A tag that hangs anywhere within 3 m of where it is declared, and a base that is known to 9 m.
+TEST_F(Calibrations, NameTheLargestPartOfARegionThatIsTooWide) {
+  const auto id = site(square(40));
+  auto one_heading = made(21);
+  one_heading.turn_rate_radps = 0;  // else the flight itself would show where it hangs
+  const auto mission = flown(one_heading, 0, id);
+  auto declared = database_->stores().missions.mission(MissionId{parse_uuid(mission).value()}).value();
+  declared.lever_arm_sigma_m = 3;
+  ASSERT_TRUE(database_->stores().missions.update(declared));
+  const auto expect_named = [&](const std::string& part, const std::string& help) {
+    const auto calibration = solved(mission);
+    for (const auto& anchor : calibration["anchors"]) {
+      const auto reason = anchor["quality"].value("reason", "");
+      EXPECT_NE(reason.find("too wide for its distance; the largest part of its uncertainty is " + part),
+                std::string::npos)
+          << reason;
+      EXPECT_NE(reason.find("help most: " + help), std::string::npos) << reason;
+      EXPECT_EQ(anchor["quality"]["acceptable"], false);
+    }
+    const auto page = get("/api/v1/calibrations/" + calibration.value("id", "") + "/report").body;
+    EXPECT_NE(page.find("is withheld: its region is too wide for its distance; the largest part of its "
+                        "uncertainty is " +
+                        part),
+              std::string::npos);
+  };
+  expect_named("the lever arm (", "measure the lever arm");
+  Call options;
+  options.type = "application/merge-patch+json";
+  options.headers["if-match"] = header(get("/api/v1/sites/" + id), "ETag");
+  ASSERT_EQ(call(Method::patch, "/api/v1/sites/" + id,
+                 R"({"crs":{"base":{"source":"survey_in","sigma_m":9}}})", options)
+                .status,
+            200);
+  expect_named("the base station (", "survey the base station");
+}
+
 TEST_F(Calibrations, ShowTheMisclosureOfCheckPointsAndUseNone) {
   const MadeFlight m = made(13);
   const auto mission = flown(m);

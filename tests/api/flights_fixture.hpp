@@ -156,10 +156,10 @@ class Flights : public AppFixture {
       std::snprintf(
           row, sizeof row,
           R"({"t_us":%lld,"lon":%.10f,"lat":%.10f,"h_m":%.4f,"fix":"fixed","sigma_m":[0.01,0.01,0.02],)"
-          R"("correction_age_s":0.8})"
+          R"("correction_age_s":0.8%s})"
           "\n",
           static_cast<long long>(k_unix_us + std::llround(drone_->now * 1e6)), at.lon_deg, at.lat_deg,
-          at.height_m);
+          at.height_m, faces_east_ ? R"(,"heading_deg":90)" : "");
       const auto taken = post("/api/v1/fixes", row, "application/x-ndjson", {{"mission", mission_}});
       ASSERT_EQ(taken.status, 200) << taken.body;
       app_->fly();
@@ -213,8 +213,8 @@ class Flights : public AppFixture {
     return state;
   }
   /// In the air at the first waypoint's side; the lease.
-  std::string take_off() {
-    mission_ = mission();
+  std::string take_off(const std::string& mission_id = "") {
+    mission_ = mission_id.empty() ? mission() : mission_id;
     const auto plan = make_plan();
     fly(12);
     check_everything();
@@ -230,6 +230,7 @@ class Flights : public AppFixture {
   std::unique_ptr<LoopDrone> drone_;
   bool with_drone_{true};
   bool calibrates_{false};
+  bool faces_east_{false};  ///< the fixes say so, whatever it flies; else they have no heading
   std::string mission_;
   std::uint64_t start_{};
 };

@@ -192,6 +192,37 @@ TEST_F(LandedFlights, AreCalibratedByThemselvesAndWaitForReview) {
   EXPECT_TRUE(json(get("/api/v1/revisions"))["items"].empty()) << "a person publishes";
 }
 
+/// Of one heading: a wrong lever arm would not show.
+TEST_F(LandedFlights, HoldTheLeverArmSigmaOfTheirMissionWithoutBeingAskedAgain) {
+  faces_east_ = true;
+  Json declared{{"name", "one heading"},
+                {"frame", "wgs84"},
+                {"track_point", "gnss_antenna"},
+                {"tags", Json::array({{{"tag", "0x6e01"}, {"lever_arm_body_m", {0, 0, 0}}}})}};
+  for (const Json& sigma_m : {Json(nullptr), Json(0.02)}) {
+    declared["lever_arm_sigma_m"] = sigma_m;
+    const auto made = post("/api/v1/missions", declared.dump());
+    ASSERT_EQ(made.status, 201) << made.body;
+    EXPECT_EQ(json(made)["lever_arm_sigma_m"], sigma_m);
+    const auto before = calibrations().size();
+    const auto lease = take_off(json(made)["id"]);
+    EXPECT_EQ(json(get(base()))["lever_arm_sigma_m"], sigma_m);
+    measure(20);
+    ASSERT_EQ(act("land", lease).status, 202);
+    ASSERT_TRUE(fly_until([&] { return procedure()["step"] == "done"; }, 60));
+    ASSERT_TRUE(within(60, [&] { return calibrations().size() > before; }));
+    const Json solved = json(get("/api/v1/calibrations/" + calibrations()[0]["id"].get<std::string>()));
+    EXPECT_EQ(solved["missions"], Json::array({mission_}));
+    EXPECT_EQ(solved["provenance"]["flights"][0]["lever_arm_sigma_m"], sigma_m);
+    const Json gates = solved["anchors"][0]["quality"]["gates"];
+    const auto gate = std::ranges::find_if(gates, [](const Json& g) { return g["name"] == "unseen_arm"; });
+    ASSERT_EQ(gate == gates.end(), !sigma_m.is_null()) << gates.dump(1);
+    if (sigma_m.is_null()) {
+      EXPECT_EQ((*gate)["passed"], false) << gates.dump(1);
+    }
+  }
+}
+
 TEST_F(Flights, ARefusalToArmIsReportedWithinTwoSecondsInTheAutopilotsWords) {
   mission_ = mission();
   const auto plan = make_plan();

@@ -17,6 +17,8 @@
 #include "api/learning/freeze_rows.hpp"
 #include "api/learning/measurement_query.hpp"
 #include "api/learning/model_signer.hpp"
+#include "api/measurements/flight_requests.hpp"
+#include "api/missions/mission_json.hpp"
 #include "api/omlox/omlox_zone.hpp"
 #include "api/places/structure_json.hpp"
 #include "api/stream/hub.hpp"
@@ -84,6 +86,41 @@ TEST(CalibrationRequestWords, DeclareHowWellTheLeverArmWasMeasured) {
     ASSERT_EQ(errors.size(), 1u) << refused;
     EXPECT_EQ(errors.front().pointer, "/lever_arm_sigma_m");
   }
+}
+
+TEST(MissionFields, DeclareHowWellTheLeverArmWasMeasured) {
+  const auto declared = [](const std::optional<Json>& sigma, std::vector<FieldError>& errors) {
+    Json body{{"name", "n"}, {"frame", "wgs84"}, {"track_point", "body"}, {"tags", Json::array()}};
+    if (sigma) body["lever_arm_sigma_m"] = *sigma;
+    return read_mission(body, errors);
+  };
+  std::vector<FieldError> none;
+  for (const double sigma_m : {0.001, 0.02, 10.0}) {
+    const Mission mission = declared(sigma_m, none);
+    EXPECT_EQ(mission.lever_arm_sigma_m, sigma_m);
+    EXPECT_EQ(mission_json(mission, {}, {})["lever_arm_sigma_m"], sigma_m);
+    EXPECT_EQ(parse_mission(mission_json(mission, {}, {}).dump()).value().lever_arm_sigma_m, sigma_m);
+    EXPECT_EQ(read_mission(Json::parse(mission_request_json(mission)), none).lever_arm_sigma_m, sigma_m);
+  }
+  for (const auto& nothing : {std::optional<Json>(), std::optional<Json>(nullptr)}) {
+    const Mission mission = declared(nothing, none);
+    EXPECT_FALSE(mission.lever_arm_sigma_m.has_value());
+    EXPECT_TRUE(mission_json(mission, {}, {})["lever_arm_sigma_m"].is_null());
+    EXPECT_FALSE(parse_mission(mission_json(mission, {}, {}).dump()).value().lever_arm_sigma_m.has_value());
+    EXPECT_FALSE(Json::parse(mission_request_json(mission)).contains("lever_arm_sigma_m"));
+  }
+  EXPECT_TRUE(none.empty());
+  for (const Json& refused : {Json(0), Json(0.0009), Json(-0.1), Json(10.1), Json("0.02"), Json(true)}) {
+    std::vector<FieldError> errors;
+    declared(refused, errors);
+    ASSERT_EQ(errors.size(), 1u) << refused;
+    EXPECT_EQ(errors.front().pointer, "/lever_arm_sigma_m");
+  }
+  // Of a server of before.
+  const auto before =
+      parse_mission(R"({"name":"n","frame":"local","track_point":"body","tags":[],"state":"finished"})");
+  ASSERT_TRUE(before) << before.error().message;
+  EXPECT_FALSE(before.value().lever_arm_sigma_m.has_value());
 }
 
 TEST(CalibrationRequestWords, RefuseAnotherWordWithThoseThereAre) {

@@ -63,3 +63,37 @@ test('anchors are withheld with the reason, and accepted once the sigma of the l
   assert.deepEqual(seen.errors, []);
   await page.close();
 });
+
+test('a flight that declares the sigma of its lever arm is accepted without being asked, and Review shows what it holds', async () => {
+  const about = JSON.parse(readFileSync(join(flight, 'flight.json'), 'utf8'));
+  writeFileSync(join(flight, 'flight.json'), JSON.stringify({ ...about, name: 'declared', lever_arm_sigma_m: 0.03 }));
+  const solved = await run(['solve', flight, '--format', 'json']);
+  assert.equal(solved.code, 0, solved.stderr);
+  const [alone] = JSON.parse(solved.stdout).flights;
+  assert.equal(alone.shared.lever_arm_sigma_m, 0.03);
+  assert.ok(alone.anchors.every((a) => a.gates.every((g) => g.name !== 'unseen_arm')));
+  const other = await run(['solve', flight, '--format', 'json', '--lever-arm-sigma', '0.2']);
+  assert.equal(JSON.parse(other.stdout).flights[0].shared.lever_arm_sigma_m, 0.2, 'what is asked for comes first');
+  const imported = await run(['import', 'flight', flight, '--url', server.url]);
+  assert.equal(imported.code, 0, imported.stderr);
+  const { page, seen, id } = await openPage(browser, server, { hash: '#/anchors' });
+  await id('review').click();
+  await id('draft').waitFor({ timeout: 60_000 });
+  const n = await id('draft').locator('tbody tr').count(),
+    passed = (await text(id('draft'))).match(/accepted/g).length;
+  assert.ok(passed >= n - 1, `${passed} of ${n}`);
+  assert.match(await text(id('lever-arm-sigma')), /measured to 0\.030 m, one sigma/);
+  assert.equal(await id('lever-arm-sigma').getByRole('textbox').inputValue(), '0.03');
+  assert.deepEqual(await violations(page), []);
+  await picture(page, 'one-heading-declared');
+  // A word of the reviewer comes before that of the flight: what was measured to 3 m makes regions that name it.
+  await id('lever-arm-sigma').getByRole('textbox').fill('3');
+  await id('lever-arm-sigma').getByRole('button', { name: 'Solve again' }).click();
+  await eventually('regions are too wide', async () => /measured to 3\.000 m/.test(await text(id('lever-arm-sigma'))));
+  assert.match(
+    await text(id('draft')),
+    /too wide for its distance; the largest part of its uncertainty is the lever arm \(\d+ %\), and what would help most: measure the lever arm/,
+  );
+  assert.deepEqual(seen.errors, []);
+  await page.close();
+});

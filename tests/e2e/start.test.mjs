@@ -137,6 +137,9 @@ test('a flight whose columns have other names is imported by saying what they ar
     await page.getByLabel(field).fill(value);
     await page.getByLabel(field).blur();
   }
+  await id('import-arm-sigma').fill('-1');
+  assert.equal(await id('import-send').isEnabled(), false);
+  await id('import-arm-sigma').fill('0,02');
   await id('import-name').fill('Brought along');
   await id('import-send').click();
   await id('toast')
@@ -145,6 +148,7 @@ test('a flight whose columns have other names is imported by saying what they ar
   const mission = (await get('/api/v1/missions')).items.find((m) => m.name === 'Brought along');
   assert.equal(mission.state, 'finished');
   assert.deepEqual(mission.tags, [{ tag: '0x6e01', antenna: 0, lever_arm_body_m: [0.12, 0, -0.28] }]);
+  assert.equal(mission.lever_arm_sigma_m, 0.02);
   // Row by row what the file says.
   const { items } = await get(`/api/v1/ranges?mission=${mission.id}&limit=5`),
     first = readFileSync(ranges, 'utf8')

@@ -1,6 +1,7 @@
 import { describe, expect, it } from 'vitest';
 import { over_goal_words, row_of } from '../src/api/anchors';
 import { STATUS_LOOK } from '../src/ui/marks';
+import { largest_part } from '../src/views/largest_part';
 import { why_not_done } from '../src/ui/words';
 
 const published = (more: object) =>
@@ -41,6 +42,20 @@ describe('a published anchor', () => {
       help: 'points at another height',
     });
     expect(published({ budget: null }).budget).toBeNull();
+    expect(largest_part(published({ budget }).budget)).toBe(
+      'The largest part of its uncertainty is the geometry of the flight (50 %). What would help most: points at another height.',
+    );
+    expect(largest_part(null)).toBe('');
+  });
+  it('is told once what would help, by the server where it knows', () => {
+    const reason =
+      'not within the accuracy goal: 95 % horizontal 0.51 m (goal 0.30 m); the largest part of its uncertainty is the lever arm (80 %),' +
+      ' and what would help most: measure the lever arm';
+    const text = why_not_done({
+      ...published({ quality: { verdict: 'ok', reason, gates: [] } }),
+      status: 'found',
+    })?.text;
+    expect(text).toBe(`N${reason.slice(1)}.`);
   });
 });
 

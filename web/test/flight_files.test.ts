@@ -21,6 +21,7 @@ const about: About = {
   epoch_ms: Date.parse('2026-05-04T10:00:00Z'),
   point: 'gnss_antenna',
   lever_arm_m: [0.12, 0, -0.28],
+  lever_arm_sigma_m: null,
   tag: '0x6e01',
 };
 const flight = (
@@ -73,6 +74,7 @@ describe('a flight from files', () => {
     expect(f.ranges).toEqual([
       { t_us: 1777888800150000, tag: '0x6e01', anchor: '0x6a21', distance_m: 7.412, rx_dbm: -81.5, seq: 3 },
     ]);
+    expect(f.mission).not.toHaveProperty('lever_arm_sigma_m'); // nobody says
     expect(f.mission).toMatchObject({
       frame: 'wgs84',
       track_point: 'gnss_antenna',
@@ -135,6 +137,7 @@ describe('a flight from files', () => {
         epoch_utc: '2026-01-01T00:00:00Z',
         track: { frame: 'wgs84', point: 'body', heading_column: 'yaw', heading_enu_ccw_from_east_deg: { add: 90 } },
         tags: [{ tag_id: '0x6e02', lever_arm_body_m: [1, 2, 3] }],
+        lever_arm_sigma_m: 0.02,
       }),
     );
     // Yaw 0, 90 to be added: counter-clockwise from east, so north; heading 0.
@@ -144,6 +147,7 @@ describe('a flight from files', () => {
       kit: 'blue',
       track_point: 'body',
       tags: [{ tag: '0x6e02', lever_arm_body_m: [1, 2, 3] }],
+      lever_arm_sigma_m: 0.02,
     });
   });
   it.each([

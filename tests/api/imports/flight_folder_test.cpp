@@ -185,6 +185,25 @@ TEST_F(FlightFolder, TakesRangesBetweenAnchorsAndWritesThem) {
   EXPECT_NE(bad.error().message.find("anchor_anchor"), std::string::npos);
 }
 
+TEST_F(FlightFolder, KeepsHowWellTheLeverArmWasMeasured) {
+  globe();
+  const auto declare = [&](const std::string& sigma) {
+    write("flight.json",
+          R"({"track": {"frame": "wgs84", "point": "body"}, "lever_arm_sigma_m": )" + sigma + "}");
+  };
+  ASSERT_TRUE(write_flight_folder(read_flight_folder(folder_).value(), folder_ / "unsaid"));
+  EXPECT_FALSE(read_flight_folder(folder_ / "unsaid").value().mission.lever_arm_sigma_m.has_value());
+  declare("0.02");
+  const FlightData flight = read_flight_folder(folder_).value();
+  EXPECT_EQ(flight.mission.lever_arm_sigma_m, 0.02);
+  ASSERT_TRUE(write_flight_folder(flight, folder_ / "copy"));
+  EXPECT_EQ(read_flight_folder(folder_ / "copy").value().mission.lever_arm_sigma_m, 0.02);
+  for (const char* refused : {"0", "-0.02", "10.5", "\"0.02\"", "[0.02]"}) {
+    declare(refused);
+    expect_error("'lever_arm_sigma_m' must be 0.001 to 10 m");
+  }
+}
+
 TEST_F(FlightFolder, WritesWhatItReads) {
   globe();
   const FlightData first = read_flight_folder(folder_).value();

@@ -180,6 +180,12 @@ TEST(LiveMission, NoAnchorConvergesThatAGateHoldsBack) {
   const auto one_heading = fly(make_flight(MadeFlight{}));
   EXPECT_EQ(n_held_back(one_heading, "unseen_arm"), 4U);
   EXPECT_EQ(n_converged(one_heading), 0U);
+  // Unless the mission says how well it was measured.
+  auto declared = make_flight(MadeFlight{});
+  declared.mission.lever_arm_sigma_m = 0.02;
+  const auto told = fly(declared);
+  EXPECT_EQ(n_held_back(told, "unseen_arm"), 0U);
+  EXPECT_EQ(n_converged(told), 4U);
   // Two devices with one id: from 60 s on the ranges are those of an anchor elsewhere.
   MadeFlight made = turning(), elsewhere = turning();
   elsewhere.anchors[0] += Eigen::Vector3d(1.5, -1, 0);

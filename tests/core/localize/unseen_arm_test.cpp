@@ -121,6 +121,41 @@ TEST(UnseenArm, WidensRegionsByExactlyTheSigmaThatIsDeclared) {
   }
 }
 
+// Nobody has to say it twice: a mission that declares it is solved as if the options had.
+TEST(UnseenArm, OfAMissionThatDeclaresTheSigmaIsHeldAsOneOfTheOptions) {
+  FlightData flight = make_flight(MadeFlight{});
+  FlightOptions options;
+  options.lever_arm_sigma_m = 0.03;
+  const FlightSolution asked = solved(flight, options);
+  flight.mission.lever_arm_sigma_m = 0.03;
+  const FlightSolution declared = solved(flight);
+  options.lever_arm_sigma_m = 0.15;
+  const FlightSolution other = solved(flight, options);
+  EXPECT_EQ(declared.shared.lever_arm_sigma_m, 0.03);
+  EXPECT_EQ(other.shared.lever_arm_sigma_m, 0.15) << "what is asked for comes before it";
+  for (std::size_t i = 0; i < declared.anchors.size(); ++i) {
+    const Estimate& estimate = declared.anchors[i].estimate;
+    EXPECT_TRUE(estimate.acceptable()) << i;
+    EXPECT_EQ(estimate.best->covariance_m2, asked.anchors[i].estimate.best->covariance_m2) << i;
+    EXPECT_GT(other.anchors[i].estimate.h95_m, estimate.h95_m + 0.1) << i;
+  }
+}
+
+TEST(UnseenArm, IsEachMissionsOwnWhereSeveralAreSolvedTogether) {
+  FlightData careful = make_flight(MadeFlight{});
+  MadeFlight second;
+  second.seed = 2;
+  FlightData unsaid = make_flight(second);
+  careful.mission.lever_arm_sigma_m = 0.02;
+  const FlightData* both[] = {&careful, &unsaid};
+  const auto solutions = solve_flights(both).value();
+  for (const auto& anchor : solutions[0].anchors) EXPECT_EQ(unseen(anchor), nullptr);
+  for (const auto& anchor : solutions[1].anchors) {
+    ASSERT_NE(unseen(anchor), nullptr);
+    EXPECT_FALSE(unseen(anchor)->passed);
+  }
+}
+
 TEST(UnseenArm, IsHeldByTheRegionsOfASigmaThatFits) {
   MadeFlight made;
   made.arm_error_m = {0.18, -0.24, 0};
@@ -214,10 +249,15 @@ TEST(UnseenArm, IsNoSmallerForASigmaWhereTheArmIsNotApplied) {
 }
 
 TEST(UnseenArm, RefusesASigmaThatIsNone) {
-  for (const double sigma_m : {0.0, -0.1, std::nan("")}) {
+  FlightData flight = make_flight(MadeFlight{});
+  for (const double sigma_m : {0.0, -0.1, 0.0009, 10.1, std::nan("")}) {
     FlightOptions options;
     options.lever_arm_sigma_m = sigma_m;
     EXPECT_FALSE(options.check()) << sigma_m;
+    flight.mission.lever_arm_sigma_m = sigma_m;
+    const auto refused = solve_flight(flight);
+    ASSERT_FALSE(refused) << sigma_m;
+    EXPECT_NE(refused.error().message.find("0.001 to 10 m"), std::string::npos) << refused.error().message;
   }
 }
 

@@ -231,6 +231,10 @@ TEST_F(SolveCommand, WidensRegionsByTheSigmaOfTheLeverArmAndAsksNoMore) {
   EXPECT_TRUE(asked(without));
   EXPECT_FALSE(asked(with));
   EXPECT_GT(with["h95_m"].get<double>(), without["h95_m"].get<double>());
+  auto declared = nlohmann::json::parse(std::ifstream(folder_ / "flight.json"));
+  declared["lever_arm_sigma_m"] = 0.5;
+  std::ofstream(folder_ / "flight.json") << declared.dump();
+  EXPECT_EQ(first(""), with) << "what the flight declares is asked for no more";
 }
 
 TEST_F(SolveCommand, HoldsTheHeightInTheMetresOfItsOwnTable) {

@@ -56,6 +56,7 @@ class BundleStoreContract : public StoreContract {
     m.name = "flight";
     m.kit = "kit";
     m.tags = {{NetworkId{0x6e01}, 0, {0.1, 0.2, 0.3}}};
+    m.lever_arm_sigma_m = 0.1 / 3;
     m.created = k_noon;
     EXPECT_TRUE(s.missions.insert(m));
     std::vector<Range> ranges;
@@ -111,6 +112,25 @@ TEST_P(BundleStoreContract, ComeBackTheSameFromAnotherDatabase) {
   const auto back = db_->stores().bundles.take_in(mission, rows);
   ASSERT_TRUE(back) << back.error().message;
   EXPECT_FALSE(back.value().added()) << "all of it is here";
+}
+
+TEST_P(BundleStoreContract, HaveALeverArmSigmaWithinItsLimitsOrNone) {
+  const auto mission = flown();
+  Rows rows = written(*db_, mission);
+  BundleCell& sigma = rows.tables["mission"][0].back();
+  EXPECT_EQ(sigma, BundleCell{0.1 / 3});
+  ScratchDir folder;
+  const auto other = open_sqlite(folder.path() / "data");
+  for (const double refused : {0.0, -0.02, 10.5, 1e300}) {
+    sigma = refused;
+    const auto taken = other->stores().bundles.take_in(mission, rows);
+    ASSERT_FALSE(taken) << refused;
+    EXPECT_EQ(taken.error().code, Errc::invalid_argument);
+    EXPECT_NE(taken.error().message.find("0.001 to 10 m"), std::string::npos) << taken.error().message;
+  }
+  sigma = std::monostate{};
+  ASSERT_TRUE(other->stores().bundles.take_in(mission, rows));
+  EXPECT_EQ(other->stores().missions.mission(mission).value().lever_arm_sigma_m, std::nullopt);
 }
 
 TEST_P(BundleStoreContract, AreTakenFromSqlite) {

@@ -33,6 +33,7 @@ TEST_P(MissionStoreContract, GivesBackEveryField) {
   m.created = k_noon;
   m.finished = UtcTime{k_noon.ns + 1};
   m.tags = {{NetworkId{0x6e01}, 0, {0.1, -0.2, -0.3}}, {NetworkId{0xffffffff}, 255, {0, 0, 0}}};
+  m.lever_arm_sigma_m = 0.1 / 3;
   ASSERT_TRUE(db_->stores().missions.insert(m));
   const auto found = db_->stores().missions.mission(m.id).value();
   EXPECT_EQ(found.site, m.site);
@@ -48,17 +49,24 @@ TEST_P(MissionStoreContract, GivesBackEveryField) {
   EXPECT_EQ(found.tags[0].lever_arm_body_m, Eigen::Vector3d(0.1, -0.2, -0.3));
   EXPECT_EQ(found.tags[1].tag, NetworkId{0xffffffff});
   EXPECT_EQ(found.tags[1].antenna, 255);
+  EXPECT_EQ(found.lever_arm_sigma_m, 0.1 / 3);
 }
 
 TEST_P(MissionStoreContract, UpdatesAllOfAMissionAndNamesAnUnknownOne) {
   Mission m = stored_mission();
+  EXPECT_EQ(db_->stores().missions.mission(m.id).value().lever_arm_sigma_m, std::nullopt);
   m.name = "other";
   m.tags = {{NetworkId{9}, 1, {1, 2, 3}}};
+  m.lever_arm_sigma_m = 0.05;
   m.state = MissionState::finished;
   ASSERT_TRUE(db_->stores().missions.update(m));
   const auto found = db_->stores().missions.mission(m.id).value();
   EXPECT_EQ(found.name, "other");
   EXPECT_EQ(found.tags.size(), 1u);
+  EXPECT_EQ(found.lever_arm_sigma_m, 0.05);
+  m.lever_arm_sigma_m.reset();
+  ASSERT_TRUE(db_->stores().missions.update(m));
+  EXPECT_EQ(db_->stores().missions.mission(m.id).value().lever_arm_sigma_m, std::nullopt);
   m.id = MissionId{make_uuid_v7(k_noon)};
   EXPECT_EQ(db_->stores().missions.update(m).error().code, Errc::not_found);
   EXPECT_EQ(db_->stores().missions.mission(m.id).error().code, Errc::not_found);

@@ -58,7 +58,8 @@ TEST_F(Migrate, FindsEveryLandedMigrationAsItWas) {
             "10 098b135dddac37d59e25a60e4ca32042085fe09793cd02a168a2db795eed8968\n"
             "11 fb46c23aed9b18c6fb8d78f4b993f62c7c9955ea2d2f7ce173a314072fd736a2\n"
             "12 772f473e05d3ce7c38825e4939476ca713a0069c8b4555c9abcce6f130781942\n"
-            "13 845d3d59444816e9878b0455545bdeeba14f292f9fcd6ca1591df6771568df0c\n");
+            "13 845d3d59444816e9878b0455545bdeeba14f292f9fcd6ca1591df6771568df0c\n"
+            "14 07550435216e8f5b8dde3ec2b19bcbc653d17024461c3afb34ea1d91a477033b\n");
 }
 
 TEST_F(Migrate, KnowsTheDigestOfAPublishedVector) {
@@ -185,6 +186,7 @@ TEST_F(Migrate, OpensAStoredDatabaseOfEveryEarlierVersion) {
     const auto missions = db.value()->stores().missions.missions(10, std::nullopt).value();
     ASSERT_EQ(missions.size(), 1u);
     EXPECT_EQ(missions[0].name, "stored flight");
+    EXPECT_EQ(missions[0].lever_arm_sigma_m, version < 14 ? std::nullopt : std::optional(0.02));
     EXPECT_EQ(db.value()->stores().measurements.count_ranges(missions[0].id).value(), 3u);
     EXPECT_EQ(db.value()->stores().measurements.count_fixes(missions[0].id).value(), 2u);
     MeasurementStore::Filter filter;
@@ -209,6 +211,7 @@ TEST_F(Migrate, WritesAStoredDatabaseWhenAsked) {
   m.id = MissionId{make_uuid_v7(k_noon)};
   m.name = "stored flight";
   m.tags = {{NetworkId{0x6e01}, 0, {0.1, 0, -0.12}}};
+  m.lever_arm_sigma_m = 0.02;
   ASSERT_TRUE(db->stores().missions.insert(m));
   std::vector<Range> ranges = {range_at(m.id, 0), range_at(m.id, 1), range_at(m.id, 2)};
   ranges[0].cir = Cir{{1, -1, 2, -2}, 1001.6, 1.5, 1001};

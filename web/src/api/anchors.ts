@@ -218,6 +218,7 @@ export interface Calibration {
   readonly created_at: string;
   readonly published: boolean;
   readonly after_landing: boolean; ///< made by the server when the flight had landed
+  readonly lever_arm_sigma_m: number | null; ///< how well the arm of its first flight is known, as the accuracies hold it
   readonly rows: readonly AnchorRow[];
 }
 export function calibration_of(answer: unknown): Calibration | null {
@@ -228,6 +229,7 @@ export function calibration_of(answer: unknown): Calibration | null {
     created_at: str(o.created_at),
     published: Array.isArray(o.published) && o.published.length > 0,
     after_landing: obj(o.settings)?.after_landing === true,
+    lever_arm_sigma_m: num(obj((obj(o.provenance)?.flights as unknown[] | undefined)?.[0])?.lever_arm_sigma_m),
     rows: o.anchors
       .map((a): AnchorRow | null => {
         const x = obj(a);
@@ -237,7 +239,7 @@ export function calibration_of(answer: unknown): Calibration | null {
       .filter((r): r is AnchorRow => r !== null),
   };
 }
-/// `lever_arm_sigma_m`: how well the arm was measured; null: nobody says.
+/// `lever_arm_sigma_m`: how well the arm was measured; null: as the flight declares.
 export async function calibrate(
   mission: string,
   key: string,

@@ -56,7 +56,8 @@ export function why_not_done(e: EstimateMsg, task = ''): { title: string; text: 
         : e.status === 'withheld'
           ? `Withheld: ${e.verdict === 'ok' ? 'a gate fails' : VERDICT_WORDS[e.verdict]}`
           : `Why not done: ${e.verdict === 'ok' ? 'not accurate enough yet' : VERDICT_WORDS[e.verdict]}`,
-    text: `${text}${text ? ' ' : ''}${advice[e.verdict]}`,
+    // The server may have said already, from the error budget.
+    text: text.includes('would help most') ? text : `${text}${text ? ' ' : ''}${advice[e.verdict]}`,
   };
 }
 export const REFUSED_WORDS: Record<string, string> = {

@@ -1,31 +1,39 @@
-/// For a flight that would not show a wrong lever arm: whoever measured the arm says how well, and the regions then hold that.
+/// How well the lever arm was measured: what the accuracies hold of it, and another word of whoever measured it. A flight that
+/// would not show a wrong arm waits for that word where its mission says nothing.
 import { useState } from 'preact/hooks';
+import { fixed } from '../ui/format';
 
 const TAPE_MEASURE_M = 0.02;
 
 interface Props {
   readonly withheld: number; ///< anchors of the calibration
+  readonly held_m: number | null; ///< one sigma that the calibration holds; null: nobody says
   readonly busy: boolean;
   readonly solve: (sigma_m: number) => void;
 }
 
-export function LeverArmSigma({ withheld, busy, solve }: Props) {
-  const [typed, set_typed] = useState(String(TAPE_MEASURE_M));
+export function LeverArmSigma({ withheld, held_m, busy, solve }: Props) {
+  const [typed, set_typed] = useState(String(held_m ?? TAPE_MEASURE_M));
   const sigma_m = Number(typed.replace(',', '.')),
     good = Number.isFinite(sigma_m) && sigma_m > 0; // how much is too much the server says
   return (
     <form
-      class="callout"
+      class={held_m === null ? 'callout' : 'why'}
       data-testid="lever-arm-sigma"
       onSubmit={(e) => {
         e.preventDefault();
         if (good && !busy) solve(sigma_m);
       }}
     >
-      <p>
-        A wrong lever arm would not show in this flight, which withholds {withheld} anchor{withheld === 1 ? '' : 's'}.
-        If the arm was measured with care, say how well; the accuracies then hold it.
-      </p>
+      {held_m === null ? (
+        <p>
+          A wrong lever arm would not show in this flight, which withholds {withheld} anchor{withheld === 1 ? '' : 's'}.
+          If the arm was measured with care, say how well; the accuracies then hold it. Said with the flight
+          (lever_arm_sigma_m), nobody is asked.
+        </p>
+      ) : (
+        <p>The accuracies hold a lever arm that was measured to {fixed(held_m, 3)} m, one sigma.</p>
+      )}
       <div class="one-line">
         <label for="arm-sigma">Lever arm, one sigma, m</label>
         <input

@@ -33,6 +33,7 @@ import { ReviewAnchor } from './review_anchor';
 import { FlightTime } from './flight/flight_time';
 import { flying } from './flight/words';
 import { LeverArmSigma } from './lever_arm_sigma';
+import { largest_part } from './largest_part';
 
 interface Form {
   readonly note: string;
@@ -140,7 +141,15 @@ export function Publish({ mission }: { mission: MissionMsg }) {
         What is published is what facility tools read; the running estimates are not.
       </p>
       <FlightTime mission={mission.mission} />
-      {solves && unseen > 0 && <LeverArmSigma withheld={unseen} busy={busy !== ''} solve={solve_again} />}
+      {solves && draft && (unseen > 0 || draft.lever_arm_sigma_m !== null) && (
+        <LeverArmSigma
+          key={draft.id}
+          withheld={unseen}
+          held_m={draft.lever_arm_sigma_m}
+          busy={busy !== ''}
+          solve={solve_again}
+        />
+      )}
       {busy === 'calibrating' && <p role="status">Solving {mission.n_ranges} ranges.</p>}
       {problem && (
         <div class="problem" role="status">
@@ -312,7 +321,10 @@ function DraftRow({
       <td>
         <StatusChip status={r.status} />
         {over && <span class="caution block wrap">{over}</span>}
-        <span class="mut block wrap">{r.verdict === 'ok' ? '' : r.reason || VERDICT_WORDS[r.verdict]}</span>
+        {over && <span class="mut block wrap">{largest_part(r.budget)}</span>}
+        <span class="mut block wrap">
+          {passes(r) ? '' : r.reason || (r.verdict === 'ok' ? '' : VERDICT_WORDS[r.verdict])}
+        </span>
       </td>
       <td class="num">{accuracy(r.h95_m)}</td>
       <td class="num">{accuracy(r.v95_m)}</td>

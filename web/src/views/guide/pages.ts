@@ -83,15 +83,16 @@ export const PAGES: readonly Page[] = [
           'Put the aircraft level. Forward is where its nose points.',
           "Measure from the middle of the GNSS antenna's phase centre (its label gives the height above the mount) to the middle of the tag's antenna.",
           'Forward and left are positive; below the antenna is negative. Example: 12 cm ahead, 28 cm below is 0.12, 0, −0.28.',
-          'Give it with the flight: in flight.json, on the page of the import, or as tags of POST /missions. System, Lever arms shows what a flight has.',
+          'Say how well: one sigma of the forward and left part. With a tape measure 0.02 m; by eye 0.05 m; from the drawing of the mount 0.005 m.',
+          'Give both with the flight: tags and lever_arm_sigma_m of POST /missions or of flight.json, or in Import a flight. System, Lever arms, shows them.',
         ],
       },
       { h: 'Check' },
       {
         list: [
           'In flight: a 360° turn over one point. With a wrong lever arm the residuals of all anchors swing with the heading.',
-          'A flight of one heading shows nothing of a wrong lever arm, and its anchors are withheld for that; nor does a track without heading. Let the' +
-            ' nose follow the course, or hold a heading a quarter turn away for 20 s.',
+          'A flight of one heading shows nothing of a wrong lever arm, and where nobody says how well it was measured its anchors are withheld for that;' +
+            ' nor does a track without heading. Let the nose follow the course, or hold a heading a quarter turn away for 20 s.',
           'After the flight: the calibration solves what is left of it and reports it as the antenna offset of the kit. More than 3 cm: measure again.',
         ],
       },
@@ -511,7 +512,7 @@ export const PAGES: readonly Page[] = [
           [
             'A wrong lever arm would not show',
             'the aircraft kept one heading, or the track has none',
-            'Fly 20 s or more with the heading a quarter turn away; or say in Review how well the arm was measured',
+            'Fly 20 s or more with the heading a quarter turn away; or say how well the arm was measured, with the flight or in Review',
           ],
           [
             'Not converged in time',

@@ -24,6 +24,7 @@ export interface About {
   readonly epoch_ms: number; ///< of t = 0, where times are seconds of the flight
   readonly point: 'gnss_antenna' | 'body' | 'tag_antenna';
   readonly lever_arm_m: readonly [number, number, number];
+  readonly lever_arm_sigma_m: number | null; ///< how well the arms were measured; null: nobody says
   readonly tag: string; ///< where no column says it
 }
 export interface Declared {
@@ -47,7 +48,8 @@ export function declared_of(text: string): Declared {
         number,
       ],
     }));
-  const epoch_ms = Date.parse(str(o.epoch_utc));
+  const epoch_ms = Date.parse(str(o.epoch_utc)),
+    lever_arm_sigma_m = num(o.lever_arm_sigma_m);
   return {
     about: {
       ...(str(o.name) ? { name: str(o.name) } : {}),
@@ -55,6 +57,7 @@ export function declared_of(text: string): Declared {
       ...(Number.isNaN(epoch_ms) ? {} : { epoch_ms }),
       ...(point === 'gnss_antenna' || point === 'body' || point === 'tag_antenna' ? { point } : {}),
       ...(tags[0] ? { tag: tags[0].tag } : {}),
+      ...(lever_arm_sigma_m === null ? {} : { lever_arm_sigma_m }),
     },
     tags: tags.length ? tags : null,
     heading: str(track?.heading_column)
@@ -159,6 +162,7 @@ export function flight_of(
       ...(about.kit ? { kit: about.kit } : {}),
       frame: is_local(tc) ? 'local' : 'wgs84',
       track_point: about.point,
+      ...(about.lever_arm_sigma_m === null ? {} : { lever_arm_sigma_m: about.lever_arm_sigma_m }),
       take_devices: false,
       tags:
         declared?.tags ??

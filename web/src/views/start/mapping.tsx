@@ -51,9 +51,11 @@ export function Mapping({ found, back }: { found: Found; back: () => void }) {
       epoch_ms: Date.now(),
       point: 'gnss_antenna',
       lever_arm_m: [0, 0, 0],
+      lever_arm_sigma_m: null,
       tag: '',
       ...declared?.about,
     })),
+    [arm_sigma, set_arm_sigma] = useState(about.lever_arm_sigma_m?.toString() ?? ''),
     [share, set_share] = useState<number | null>(null),
     [problem, set_problem] = useState('');
   // A few seconds of work for a flight of hours: only where what it rests on changes.
@@ -77,10 +79,12 @@ export function Mapping({ found, back }: { found: Found; back: () => void }) {
     ),
     wide =
       !rc.anchor && !rc.range ? anchor_columns(ranges, Object.values({ ...rc, ...(track === ranges ? tc : {}) })) : [];
+  const sigma_m = arm_sigma.trim() === '' ? null : Number(arm_sigma.replace(',', '.')),
+    bad_sigma = sigma_m !== null && !(sigma_m > 0); // how much is too much the server says
   const send = async (): Promise<void> => {
     set_problem('');
     try {
-      const flight = flight_of(track, tc, ranges, rc, reading, about, declared);
+      const flight = flight_of(track, tc, ranges, rc, reading, { ...about, lever_arm_sigma_m: sigma_m }, declared);
       if (!flight.fixes.length || !flight.ranges.length)
         throw new Error(flight.refused[0] ?? 'There is not one position and one range in it.');
       set_share(0);
@@ -257,6 +261,19 @@ export function Mapping({ found, back }: { found: Found; back: () => void }) {
             )}
           </>
         )}
+        {about.point !== 'tag_antenna' && (
+          <label>
+            <span class="lab">How well that was measured, one sigma, m</span>
+            <input
+              value={arm_sigma}
+              inputMode="decimal"
+              placeholder="not said"
+              aria-invalid={bad_sigma}
+              data-testid="import-arm-sigma"
+              onInput={(e) => set_arm_sigma(e.currentTarget.value)}
+            />
+          </label>
+        )}
       </div>
       {problem && (
         <div class="problem" role="alert" data-testid="import-problem">
@@ -268,7 +285,11 @@ export function Mapping({ found, back }: { found: Found; back: () => void }) {
         <button type="button" class="btn" disabled={share !== null} onClick={back}>
           Other files
         </button>
-        <button class="btn primary" data-testid="import-send" disabled={missing.length > 0 || share !== null}>
+        <button
+          class="btn primary"
+          data-testid="import-send"
+          disabled={missing.length > 0 || bad_sigma || share !== null}
+        >
           {share === null ? 'Import' : `Importing, ${fixed(share * 100, 0)} %`}
         </button>
       </div>

@@ -92,6 +92,13 @@ export function LeverPanel() {
           </tbody>
         </table>
       )}
+      {flight && flight.tags.length > 0 && flight.track_point !== 'tag_antenna' && (
+        <p class="why" data-testid="lever-arm-sigma">
+          {flight.lever_arm_sigma_m == null
+            ? 'How well it was measured is not said (lever_arm_sigma_m of the flight): a flight of one heading is withheld for it.'
+            : `Measured to ${fixed(flight.lever_arm_sigma_m, 3)} m, one sigma, which the accuracies hold.`}
+        </p>
+      )}
       {kit && (
         <dl class="kv s">
           <div>
