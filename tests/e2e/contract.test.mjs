@@ -198,10 +198,8 @@ test('a building, its floor, the plan of it: sent, placed, traced, accepted, tak
   await change('PUT', `${f}/plan/georeference?dry_run=true`, 200, { json: { points } });
   await change('PUT', `${f}/plan/georeference`, 200, { json: { points } });
   await call('GET', `${f}/plan/backdrop`, { expect: 200 });
-  const { href, levels } = (await call('GET', f, { expect: 200 })).json.tiles,
-    tile = (level, column, row) => href.replace('{level}', level).replace('{column}', column).replace('{row}', row);
-  await call('GET', tile(levels.length - 1, 1, 2), { expect: 200 });
-  await call('GET', tile(0, 1, 0), { expect: 404 });
+  await call('GET', `${f}/plan/tiles/2/1/2`, { expect: 200 });
+  await call('GET', `${f}/plan/tiles/0/1/0`, { expect: 404 });
   await call('POST', `${f}/plan/trace`, { expect: 200, headers: { prefer: 'wait=60' } });
   const traced = await call('GET', `${f}/plan/trace`, { expect: 200 });
   assert.equal(traced.json.walls.length, 4);
