@@ -103,16 +103,24 @@ TEST_F(Flights, StartsHoldsResumesAndLands) {
   EXPECT_EQ(act("return", lease).status, 422) << "nothing flies any more";
 }
 
+class BusyFlights : public Flights {
+ protected:
+  /// The flight is in the air; whoever holds `live` from here on keeps its strand busy.
+  auto take_off_with(HeldExecutor& live) {
+    live.holding = false;
+    live_ = &live;
+    app_.reset();
+    database_.reset();
+    open();
+    return take_off();
+  }
+};
+
 /// Two seconds without a position are a hold, ten the way home: an engineer who excludes rows of a long
 /// flight in the air must cause neither.
-TEST_F(Flights, KeepTheirPositionWhileTheirRowsAreReadAgain) {
+TEST_F(BusyFlights, KeepTheirPositionWhileTheirRowsAreReadAgain) {
   HeldExecutor live;
-  live.holding = false;
-  live_ = &live;
-  app_.reset();
-  database_.reset();
-  open();
-  const auto lease = take_off();
+  const auto lease = take_off_with(live);
   live.holding = true;
   const auto since = k_unix_us + std::llround(drone_->now * 1e6) - 5'000'000;
   const Json exclusion{{"kind", "fixes"},
@@ -133,14 +141,9 @@ TEST_F(Flights, KeepTheirPositionWhileTheirRowsAreReadAgain) {
 }
 
 /// A solve of hundreds of anchors takes as long.
-TEST_F(Flights, KeepTheirPositionWhileEstimatesWait) {
+TEST_F(BusyFlights, KeepTheirPositionWhileEstimatesWait) {
   HeldExecutor live;
-  live.holding = false;
-  live_ = &live;
-  app_.reset();
-  database_.reset();
-  open();
-  const auto lease = take_off();
+  const auto lease = take_off_with(live);
   live.holding = true;
   fly(12);
   EXPECT_GT(live.held(), 0U);

@@ -147,6 +147,7 @@ TEST_F(MissionLive, HoldsAnAnchorAgainstTheTargetOfItsFlownPlanAndNotAgainstTheS
   const MissionId key{parse_uuid(id).value()};
   ASSERT_TRUE(database_->stores().plans.keep_procedure(
       key, R"({"landed":true,"targets":{"sigma_m":null,"anchors":{"0x6000":5}}})", UtcTime{}));
+  restart();
   deliver(id, flight, 0, 120.5);
   const auto done = [&] {
     const auto anchors = live(id);

@@ -6,7 +6,7 @@ import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { after, before, test } from 'node:test';
 import { openBrowser, openPage, picture, text, violations } from './browser.mjs';
-import { room_png } from './room.mjs';
+import { placed_floor, room_png } from './room.mjs';
 import { eventually, run, startServer } from './server.mjs';
 
 const folder = mkdtempSync(join(tmpdir(), 'anchord backdrop '));
@@ -14,27 +14,16 @@ let browser, server;
 
 before(async () => {
   server = await startServer({ auth: 'off' });
-  const send = async (method, path, options) => {
-    const answer = await server.fetch(path, { method, ...options });
-    assert.ok(answer.ok, `${method} ${path}: ${answer.status} ${await answer.clone().text()}`);
-    return { json: await answer.json(), etag: answer.headers.get('etag') };
-  };
-  const made = (path, json) => send('POST', path, { json });
-  const site = await made('/api/v1/sites', { name: 'Hall', origin: { lon: 3.7131, lat: 51.0231, h_m: 50 } }),
-    building = await made('/api/v1/buildings', { site: site.json.id, name: 'B1', height_m: 8 }),
-    floor = await made('/api/v1/floors', { building: building.json.id, name: 'Ground', level: 0 }),
-    path = `/api/v1/floors/${floor.json.id}/plan`;
-  const sent = await send('PUT', path, {
-    body: room_png(),
-    headers: { 'content-type': 'image/png', 'if-match': floor.etag },
-  });
   // The room is the hall: 5 cm a pixel, its south-west corner, pixel (100, 500), at the site's origin.
-  const points = [
-    [100, 500, 0, 0],
-    [700, 500, 30, 0],
-    [100, 100, 0, 20],
-  ].map(([x, y, e, n]) => ({ pixel: [x, y], enu_m: [e, n] }));
-  await send('PUT', `${path}/georeference`, { json: { points }, headers: { 'if-match': sent.etag } });
+  await placed_floor(server, {
+    origin: { lon: 3.7131, lat: 51.0231, h_m: 50 },
+    png: room_png(),
+    points: [
+      [100, 500, 0, 0],
+      [700, 500, 30, 0],
+      [100, 100, 0, 20],
+    ],
+  });
   const flight = join(folder, 'flight');
   assert.equal((await run(['simulate', 'flight', '--seed', '7', '--duration', '60', '--out', flight])).code, 0);
   const replayed = await run(['replay', flight, '--url', server.url, '--speed', 'max']);

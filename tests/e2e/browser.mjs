@@ -76,11 +76,14 @@ export async function violations(page, { sizes = false, within = null } = {}) {
 
 /** Opened by Enter on its opener, a dialog has the focus; Escape closes it, and the opener, or what is there in its place, has the focus again. */
 export async function opensByKeys(page, opener, dialog) {
-  await opener.focus();
+  const has_focus = (locator) => locator.evaluate((e) => e.contains(document.activeElement)),
+    waited = async (what, when) => assert.ok(await until(when, 10_000), what);
+  await waited('the opener may be pressed', async () => {
+    await opener.focus();
+    return has_focus(opener);
+  });
   await page.keyboard.press('Enter');
   await dialog.waitFor();
-  const has_focus = (locator) => locator.evaluate((e) => e.contains(document.activeElement)),
-    waited = async (what, when) => assert.ok(await until(when, 3000), what);
   await waited('the dialog has the focus', () => has_focus(dialog));
   await page.keyboard.press('Escape');
   await dialog.waitFor({ state: 'detached' });

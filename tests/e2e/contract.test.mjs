@@ -175,7 +175,7 @@ test('a building, its floor, the plan of it: sent, placed, traced, accepted, tak
   await call('GET', `/api/v1/buildings?site=${site}`, { expect: 200 });
   await call('GET', `/api/v1/floors?building=${building.json.id}`, { expect: 200 });
   await call('GET', `/api/v1/buildings/${unknown}`, { expect: 404 });
-  for (const part of ['', '/plan', '/plan/preview', '/plan/backdrop', '/plan/trace', '/walls'])
+  for (const part of ['', '/plan', '/plan/preview', '/plan/backdrop', '/plan/tiles/0/0/0', '/plan/trace', '/walls'])
     await call('GET', `/api/v1/floors/${unknown}${part}`, { expect: 404 });
   const merge = { headers: { 'content-type': 'application/merge-patch+json' } };
   await call('PATCH', b, {
@@ -187,8 +187,6 @@ test('a building, its floor, the plan of it: sent, placed, traced, accepted, tak
   const png = { headers: { 'content-type': 'image/png' } };
   await change('PUT', `${f}/plan`, 415, { ...png, body: 'GIF89a' });
   await change('PUT', `${f}/plan`, 201, { ...png, body: room_png() });
-  await call('GET', `${f}/plan`, { expect: 200 });
-  await call('GET', `${f}/plan/preview`, { expect: 200 });
   const points = [
     [100, 100],
     [700, 100],
@@ -197,11 +195,8 @@ test('a building, its floor, the plan of it: sent, placed, traced, accepted, tak
   await call('POST', `${f}/plan/trace`, { expect: 422 });
   await change('PUT', `${f}/plan/georeference?dry_run=true`, 200, { json: { points } });
   await change('PUT', `${f}/plan/georeference`, 200, { json: { points } });
-  await call('GET', `${f}/plan/backdrop`, { expect: 200 });
-  const { href, levels } = (await call('GET', f, { expect: 200 })).json.tiles,
-    tile = (level, column, row) => href.replace('{level}', level).replace('{column}', column).replace('{row}', row);
-  await call('GET', tile(levels.length - 1, 1, 2), { expect: 200 });
-  await call('GET', tile(0, 1, 0), { expect: 404 });
+  for (const part of ['', '/preview', '/backdrop', '/tiles/2/1/2'])
+    await call('GET', `${f}/plan${part}`, { expect: 200 });
   await call('POST', `${f}/plan/trace`, { expect: 200, headers: { prefer: 'wait=60' } });
   const traced = await call('GET', `${f}/plan/trace`, { expect: 200 });
   assert.equal(traced.json.walls.length, 4);

@@ -171,7 +171,7 @@ test('every address that names something unknown says so, and what to do; none s
     [`#/live/${gone}`, 'page', `No page #/live/${gone} is in this dashboard.`, 'choose a view'],
     [`#/models/${gone}`, 'page', `No page #/models/${gone} is in this dashboard.`, 'choose a view'],
     ['#/system/floors', 'page', 'No page #/system/floors is in this dashboard.', 'System is shown'],
-    ['#/guide/nothing', 'page', 'No page #/guide/nothing is in the guide.', 'its first page is shown'],
+    ['#/guide/elsewhere', 'page', 'No page #/guide/elsewhere is in the guide.', 'its first page is shown'],
   ]) {
     await page.evaluate((to) => (location.hash = to), hash);
     await id(`unknown-${what}`).getByText(says, { exact: true }).waitFor({ timeout: 20_000 });

@@ -1,4 +1,5 @@
-// Plans as PNGs, made byte by byte.
+// Plans as PNGs, made byte by byte, and a floor that has one.
+import assert from 'node:assert/strict';
 import { crc32, deflateSync } from 'node:zlib';
 
 const chunk = (name, data) => {
@@ -39,3 +40,23 @@ export const room_png = () =>
     600,
     (x, y) => x >= 100 && x < 700 && y >= 100 && y < 500 && (x < 115 || x >= 685 || y < 115 || y >= 485),
   );
+
+/** The floor, as the server has it, of a new site and building with this plan, placed by `points`: [pixel x, y, east m, north m]. */
+export async function placed_floor(server, { origin, png, points }) {
+  const send = async (method, path, options) => {
+    const answer = await server.fetch(path, { method, ...options });
+    assert.ok(answer.ok, `${method} ${path}: ${answer.status} ${await answer.clone().text()}`);
+    return { json: await answer.json(), etag: answer.headers.get('etag') };
+  };
+  const made = (path, json) => send('POST', path, { json });
+  const site = await made('/api/v1/sites', { name: 'Hall', origin }),
+    building = await made('/api/v1/buildings', { site: site.json.id, name: 'B1', height_m: 8 }),
+    floor = await made('/api/v1/floors', { building: building.json.id, name: 'Ground', level: 0 }),
+    path = `/api/v1/floors/${floor.json.id}/plan`,
+    sent = await send('PUT', path, { body: png, headers: { 'content-type': 'image/png', 'if-match': floor.etag } });
+  const placed = await send('PUT', `${path}/georeference`, {
+    json: { points: points.map(([x, y, e, n]) => ({ pixel: [x, y], enu_m: [e, n] })) },
+    headers: { 'if-match': sent.etag },
+  });
+  return placed.json;
+}

@@ -14,9 +14,13 @@ export interface Dialog<T extends HTMLElement> {
 const opened: { readonly help: string }[] = []; ///< newest last
 /// The page of the guide for the newest dialog; undefined where none is open.
 export const help_of_dialog = (): string | undefined => opened.at(-1)?.help;
-let focused: HTMLElement | null = null; ///< last, since a button that is disabled while it works has the focus no more
+/// What has the focus, or had it until it was disabled while it works: that ends the focus too, but nobody left it. A field that was left is no opener.
+let focused: HTMLElement | null = null;
 globalThis.addEventListener?.('focusin', (e) => {
   if (e.target instanceof HTMLElement) focused = e.target;
+});
+globalThis.addEventListener?.('focusout', (e) => {
+  if (!(e.target instanceof HTMLElement && e.target.matches(':disabled'))) focused = null;
 });
 const nowhere = (): boolean => !document.activeElement || document.activeElement === document.body;
 
