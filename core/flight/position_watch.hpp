@@ -33,7 +33,7 @@ struct PoseMoved {
 };
 using PositionEvent = std::variant<FixBelieved, FixShown, PoseMoved>;
 
-/// Where the aircraft of a mission is, told the moment a fix arrives: apart from LiveMission, whose strand
+/// Where the aircraft of a mission is, the moment a fix arrives: apart from LiveMission, whose strand
 /// may be solving, or reading what was stored, for seconds. Two seconds without a position are a hold.
 ///
 /// Judges by the rule of the estimates (LiveTrack), driven by measured times alone. Not thread-safe.
@@ -43,7 +43,7 @@ class PositionWatch {
   PositionWatch(Mission mission, const TrackLimits& limits, const std::optional<Wgs84>& origin,
                 std::vector<Exclusion> exclusions);
 
-  /// What a fix means now. Empty for one that was told already.
+  /// What a fix means now. Empty for one that was reported already.
   std::vector<PositionEvent> add(const Fix& fix);
   /// Other rows are excluded from here on: fixes are held against the last one believed, if it still is.
   void begin_anew(std::vector<Exclusion> exclusions);

@@ -219,10 +219,7 @@ TEST_F(LandedFlights, HoldTheLeverArmSigmaOfTheirMissionWithoutBeingAskedAgain) 
     EXPECT_EQ(solved["provenance"]["flights"][0]["lever_arm_sigma_m"], sigma_m);
     const Json gates = solved["anchors"][0]["quality"]["gates"];
     const auto gate = std::ranges::find_if(gates, [](const Json& g) { return g["name"] == "unseen_arm"; });
-    ASSERT_EQ(gate == gates.end(), !sigma_m.is_null()) << gates.dump(1);
-    if (sigma_m.is_null()) {
-      EXPECT_EQ((*gate)["passed"], false) << gates.dump(1);
-    }
+    EXPECT_EQ(gate == gates.end(), !sigma_m.is_null()) << "asked only where nobody says: " << gates.dump(1);
   }
 }
 

@@ -217,25 +217,27 @@ TEST_F(MissionLive, ShowsWhereTheAircraftIsThoughEstimatesWait) {
   HeldExecutor later;
   live_ = &later;
   restart();
-  Listener listener(app_->hub(), "drone.pose");
-  const auto shown_at = [&](double t_s) {
-    return listener.wait([&](const auto& newest) {
-      return newest.contains("") &&
-             newest.at("")["t_us"].template get<std::int64_t>() > k_start_us + std::llround(t_s * 1e6);
-    });
-  };
-  deliver(id, flight, 30, 60);
-  EXPECT_TRUE(shown_at(59)) << "while stored rows wait to be read";
-  while (later.run_one()) continue;
-  deliver(id, flight, 60, 90);
-  EXPECT_GT(later.held(), 0U);
-  EXPECT_TRUE(shown_at(89)) << "while rows wait to be solved";
-  const auto last = std::ranges::find_if(
-      flight.fixes, [&](const Fix& f) { return f.time.us() + k_start_us == listener.newest[""]["t_us"]; });
-  ASSERT_NE(last, flight.fixes.end());
-  const auto at = listener.newest[""]["enu_m"].get<std::vector<double>>();
-  EXPECT_LT((Eigen::Vector3d(at.at(0), at.at(1), at.at(2)) - last->local_m).norm(), 1e-3);
-  while (later.run_one()) continue;
+  {
+    Listener listener(app_->hub(), "drone.pose");
+    const auto shown_at = [&](double t_s) {
+      return listener.wait([&](const auto& newest) {
+        return newest.contains("") &&
+               newest.at("")["t_us"].template get<std::int64_t>() > k_start_us + std::llround(t_s * 1e6);
+      });
+    };
+    deliver(id, flight, 30, 60);
+    EXPECT_TRUE(shown_at(59)) << "while stored rows wait to be read";
+    while (later.run_one()) continue;
+    deliver(id, flight, 60, 90);
+    EXPECT_GT(later.held(), 0U);
+    EXPECT_TRUE(shown_at(89)) << "while rows wait to be solved";
+    const auto last = std::ranges::find_if(
+        flight.fixes, [&](const Fix& f) { return f.time.us() + k_start_us == listener.newest[""]["t_us"]; });
+    ASSERT_NE(last, flight.fixes.end());
+    const auto at = listener.newest[""]["enu_m"].get<std::vector<double>>();
+    EXPECT_LT((Eigen::Vector3d(at.at(0), at.at(1), at.at(2)) - last->local_m).norm(), 1e-3);
+    while (later.run_one()) continue;
+  }
   close();
 }
 

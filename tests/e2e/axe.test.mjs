@@ -83,7 +83,7 @@ test('no page of the guide, no state of Help and none of Replay breaks one, on a
   await id('show-elevation').click();
   await look('replay from the side');
   await page.goto(`${server.url}/?theme=light#/replay/0197a3b0-5d10-7b1e-9c55-0a1b2c3d4e5f`);
-  await page.getByText('No flight is stored under this address').waitFor();
+  await page.getByTestId('unknown-flight').waitFor();
   await look('replay of no flight');
   assert.deepEqual(found, []);
   await page.close();

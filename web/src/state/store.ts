@@ -54,12 +54,13 @@ export const server_now_us = (): number => source?.now_us() ?? Date.now() * 1000
 export const known_until_us = (): number =>
   server_now_us() - (link.value === 'lost' ? (source?.data_age_ms() ?? 0) * 1000 : 0);
 
-/// Newest recording first, then the newest of the others.
+/// Newest recording first, then the newest of the others; of two with the same measurements the one that came later (their ids rise).
 export const ordered_missions = computed(() =>
   [...mission_list.value].sort(
     (a, b) =>
       Number(b.state === 'recording') - Number(a.state === 'recording') ||
-      (b.started_us ?? b.t_us) - (a.started_us ?? a.t_us),
+      (b.started_us ?? b.t_us) - (a.started_us ?? a.t_us) ||
+      (b.mission > a.mission ? 1 : -1),
   ),
 );
 export const mission_id = computed(() => {

@@ -14,13 +14,17 @@ export interface Dialog<T extends HTMLElement> {
 const opened: { readonly help: string }[] = []; ///< newest last
 /// The page of the guide for the newest dialog; undefined where none is open.
 export const help_of_dialog = (): string | undefined => opened.at(-1)?.help;
-/// What has the focus, or had it until it was disabled while it works: that ends the focus too, but nobody left it. A field that was left is no opener.
+/// What has the focus, or had it until it was disabled while it works, or taken away: that ends the focus too, but nobody left it. A field that was
+/// left is no opener.
 let focused: HTMLElement | null = null;
 globalThis.addEventListener?.('focusin', (e) => {
   if (e.target instanceof HTMLElement) focused = e.target;
 });
 globalThis.addEventListener?.('focusout', (e) => {
-  if (!(e.target instanceof HTMLElement && e.target.matches(':disabled'))) focused = null;
+  const left = e.target as HTMLElement;
+  queueMicrotask(() => {
+    if (focused === left && left.isConnected && !left.matches(':disabled')) focused = null;
+  });
 });
 const nowhere = (): boolean => !document.activeElement || document.activeElement === document.body;
 

@@ -1,4 +1,4 @@
-/// A flight from files: tables of track and ranges, their columns told by name or by a person, as rows of the API. docs/formats.md. No DOM.
+/// A flight from files: tables of track and ranges, their columns known by name or given by a person, as rows of the API. docs/formats.md. No DOM.
 import type { Wire } from '../../api/contract';
 import { num, obj, str } from '../../live/messages';
 import { is_local, missing_ranges, missing_track, type Columns, type Field } from './fields';
@@ -32,7 +32,7 @@ export interface Declared {
   readonly tags: NonNullable<Wire<'MissionCreate'>['tags']> | null;
   readonly heading: { readonly column: string; readonly add_deg: number } | null;
 }
-/// flight.json, as far as it is told.
+/// flight.json, as far as it goes.
 export function declared_of(text: string): Declared {
   const o = obj(JSON.parse(text));
   if (!o) throw new Error('flight.json: an object is needed');

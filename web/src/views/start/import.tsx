@@ -1,4 +1,4 @@
-/// Import a flight: a folder, tables or an archive is dropped; columns whose names say nothing are told by a person; the flight opens.
+/// Import a flight: a folder, tables or an archive is dropped; columns whose names say nothing are given by a person; the flight opens.
 import { useEffect, useRef, useState } from 'preact/hooks';
 import './start.css';
 import { guessed_ranges, guessed_track, missing_ranges, missing_track } from './fields';

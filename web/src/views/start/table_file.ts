@@ -8,7 +8,7 @@ export interface Table {
   readonly decimal: '.' | ',';
 }
 const MAX_ROWS = 2_000_000;
-const SAMPLE = 200; ///< rows that tell how a column is written
+const SAMPLE = 200; ///< rows that show how a column is written
 
 /// Text of a file: by its byte order mark, else UTF-8, else the Western European of Windows, which old programs write.
 export function decoded(bytes: Uint8Array): string {
@@ -37,7 +37,7 @@ function of_rtklib(text: string): { columns: string[]; cells: string[][] } | nul
   return { columns: names, cells };
 }
 
-/// Numbers with a decimal comma are told from two numbers by the separator: a comma that separates columns is none.
+/// A decimal comma differs from a comma between two numbers by the separator: a comma that separates columns is none.
 function decimal_of(separator: string, rows: readonly (readonly string[])[]): '.' | ',' {
   if (separator === ',') return '.';
   const cells = rows.slice(0, SAMPLE).flat(),
@@ -81,7 +81,7 @@ export function number_of(cell: string, decimal: '.' | ','): number {
   if (cell === '') return NaN;
   return Number(decimal === ',' ? cell.replace(',', '.') : cell);
 }
-/// A column's first values, as they tell what it is.
+/// A column's first values, as they show what it is.
 export const sample_of = (t: Table, column: string | undefined): readonly string[] =>
   column === undefined ? [] : t.rows.slice(0, SAMPLE).map((r) => r[t.columns.indexOf(column)] ?? '');
 /// All values of a column that occur, few or many.

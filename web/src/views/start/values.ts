@@ -1,4 +1,4 @@
-/// How a flight's values are written: moments, lengths and fix classes, told by their looks or by a person. No DOM.
+/// How a flight's values are written: moments, lengths and fix classes, known by their looks or given by a person. No DOM.
 import { plain } from './fields';
 import { number_of, sample_of, values_of, type Table } from './table_file';
 
