@@ -37,10 +37,10 @@ after(async () => {
 });
 
 /** Pixels of the map below everything that moves that are walls: ink, half as strong, on the ground of the light theme. */
-const walls = (page) =>
-  page.evaluate(() => {
+const walls = (page, within = 'main') =>
+  page.evaluate((part) => {
     let n = 0;
-    for (const c of document.querySelectorAll('main .mapcanvas canvas')) {
+    for (const c of document.querySelectorAll(`${part} .mapcanvas canvas`)) {
       if (!c.width) continue;
       const { data } = c.getContext('2d').getImageData(0, 0, c.width, c.height);
       for (let i = 0; i < data.length; i += 4) {
@@ -49,11 +49,11 @@ const walls = (page) =>
       }
     }
     return n;
-  });
-const drawn = (page, what) => eventually(what, async () => (await walls(page)) > 500, 15_000, 100);
+  }, within);
+const drawn = (page, what, within) => eventually(what, async () => (await walls(page, within)) > 500, 15_000, 100);
 const gone = (page, what) => eventually(what, async () => (await walls(page)) < 100, 5000, 100);
 
-test('Live and Anchors draw the plan under their maps; the choice puts it away in both, and is remembered', async () => {
+test('Live, Anchors, Replay and Review draw the plan under their maps; the choice puts it away in both, and is remembered', async () => {
   const { page, seen, id } = await openPage(browser, server);
   for (const [view, size] of [
     ['live', [1440, 900]],
@@ -70,6 +70,18 @@ test('Live and Anchors draw the plan under their maps; the choice puts it away i
     assert.deepEqual(await violations(page), [], view);
     await picture(page, `backdrop-${view}-${size[0]}`);
   }
+  // Review and Replay have the same choice under their maps.
+  await page.setViewportSize({ width: 1440, height: 900 });
+  await id('nav-replay').click();
+  await id('scrubber').waitFor({ timeout: 20_000 });
+  await drawn(page, 'replay');
+  await id('nav-anchors').click();
+  await id('review').click();
+  await id('draft').getByTestId(/^why-/).first().click({ timeout: 60_000 });
+  await id('review-anchor').waitFor();
+  await drawn(page, 'review', '[data-testid="review-anchor"]');
+  await picture(page, 'backdrop-review');
+  await page.keyboard.press('Escape');
   await id('level').selectOption('');
   await gone(page, 'put away in Anchors');
   await id('nav-live').click();

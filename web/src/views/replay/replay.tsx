@@ -6,6 +6,7 @@ import { live_rows } from '../../api/anchors';
 import { MapBox } from '../../map/map_box';
 import { after, estimates_over_time, load_recording, neighbour, Player } from '../../state/recording';
 import { shown_estimates } from '../../state/done';
+import { backdrops } from '../../state/floors';
 import { alarms_at, procedure_at, status_of } from '../../state/moment';
 import {
   chosen_anchor,
@@ -226,6 +227,7 @@ export function Replay({ id }: { id: string | null }) {
             scene: player?.scene ?? null,
             link_lost: watched_lost(),
             running: true,
+            backdrops: backdrops(mission.origin),
           })}
           onSelect={(a) => (chosen_anchor.value = a)}
           label="Map of the recorded flight"
