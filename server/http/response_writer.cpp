@@ -41,6 +41,19 @@ void add(std::string& head, std::string_view name, std::string_view text) {
   head.append("\r\n");
 }
 
+/// Fields that may come more than once: lists, and the one that is none (RFC 9110, 5.2 and 5.3).
+bool may_repeat(std::string_view name) {
+  return iequals(name, "set-cookie") || iequals(name, "link") || iequals(name, "vary");
+}
+
+/// A later value replaces this one: clients join what comes twice, and "1, 1" is no number of seconds.
+bool replaced(const api::Response& response, std::size_t i) {
+  const auto& name = response.headers[i].first;
+  return !may_repeat(name) &&
+         std::any_of(response.headers.begin() + static_cast<std::ptrdiff_t>(i) + 1, response.headers.end(),
+                     [&](const auto& later) { return iequals(later.first, name); });
+}
+
 std::string http_date_of(std::time_t now) {
   std::tm utc{};
   gmtime_r(&now, &utc);
@@ -150,8 +163,9 @@ std::string response_head(const api::Response& response, std::string_view reques
   head.reserve(1024);
   head.append("HTTP/1.1 ").append(std::to_string(response.status)).append(" ");
   head.append(reason_phrase(response.status)).append("\r\n");
-  for (const auto& [name, text] : response.headers) {
-    if (!iequals(name, "connection")) add(head, name, text);  // ours to say
+  for (std::size_t i = 0; i < response.headers.size(); ++i) {
+    const auto& [name, text] = response.headers[i];
+    if (!iequals(name, "connection") && !replaced(response, i)) add(head, name, text);  // ours to say
   }
   add(head, "Date", http_date());
   if (!request_id.empty() && !has(response, "x-request-id")) add(head, "X-Request-Id", request_id);

@@ -93,6 +93,9 @@ export class Contract {
       const [header] = this.deref(`${pointer}/headers/${escape(name)}`);
       if (header.required && !response.headers.has(name)) throw new Error(`${what}: header ${name} is missing`);
     }
+    // What comes twice reaches a client joined: "1, 1" is no number of seconds, and whoever waits for it waits not at all.
+    for (const name of ['retry-after', 'content-type', 'etag', 'location'])
+      if (/^(.+), \1$/.test(response.headers.get(name) ?? '')) throw new Error(`${what}: header ${name} comes twice`);
     const type = (response.headers.get('content-type') ?? '').split(';')[0].trim();
     if (!promised.content || text === '') {
       if (text !== '') throw new Error(`${what}: a body of ${type} where none is promised: ${text.slice(0, 200)}`);

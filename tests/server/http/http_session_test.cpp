@@ -47,6 +47,22 @@ TEST_F(HttpSession, KeepsTheConnectionAlive) {
   }
 }
 
+/// A problem says when to come again, and whoever makes it may know better; clients join what comes twice.
+TEST_F(HttpSession, SendsAFieldThatIsNoListOnceWithItsLastValue) {
+  server_.gateway.handler = [](api::Request&) {
+    auto response = api::problem(429, "rate-limited", "wait");
+    response.header("Set-Cookie", "a=1").header("retry-after", "7").header("Set-Cookie", "b=2");
+    return response;
+  };
+  RawSocket socket(server_.port);
+  socket.send(k_get);
+  const std::string head = socket.response();
+  EXPECT_EQ(head.find("Retry-After: 1\r\n"), std::string::npos) << head;
+  EXPECT_NE(head.find("retry-after: 7\r\n"), std::string::npos) << head;
+  EXPECT_NE(head.find("Set-Cookie: a=1\r\n"), std::string::npos) << head;
+  EXPECT_NE(head.find("Set-Cookie: b=2\r\n"), std::string::npos) << head;
+}
+
 TEST_F(HttpSession, AnswersPipelinedRequestsInOrder) {
   RawSocket socket(server_.port);
   socket.send(post("/echo", "one") + k_get + chunked("/echo", "3\r\ntwo\r\n0\r\n\r\n") +
