@@ -101,7 +101,7 @@ const BY_WORD: Readonly<Record<string, FixWord>> = Object.fromEntries(
     ] as const
   ).flatMap(([fix, words]) => words.split(' ').map((w) => [w, fix])),
 );
-/// In which of them 1 and 2 may be anything, no name decides.
+/// Names that one of them alone goes by; "fix", "quality" and "rtk" are used with any.
 const BY_NAME: readonly (readonly [RegExp, FixNumbers])[] = [
   [/^q$/, 'rtklib'],
   [/carr_?soln/, 'solution'],
