@@ -91,7 +91,7 @@ export function Convergence({ anchor }: { anchor: string }) {
       <figcaption>
         {name}{' '}
         <b>{last === null ? 'not known yet' : last < 1 ? `${fixed(last * 100, 1)} cm` : `${fixed(last, 1)} m`}</b>
-        {limit_m !== null && <span class="mut"> limit ≤ {fixed(limit_m * 100, 1)} cm</span>}
+        {limit_m !== null && <span class="mut q"> limit ≤ {fixed(limit_m * 100, 1)} cm</span>}
       </figcaption>
       <div ref={box} class="plot" role="img" aria-label={words} />
     </figure>
