@@ -8,6 +8,7 @@
 #include "api/kit/late_writer.hpp"
 #include "api/planning/site_structures.hpp"
 #include "core/base/to_wire.hpp"
+#include "core/flight/hand_over.hpp"
 #include "core/ports/plan_store.hpp"
 
 namespace anchord::api {
@@ -82,7 +83,7 @@ flight::FlownChanges changes_of(const nlohmann::json& j) {
 }
 
 KeptOutcome outcome_of(const flight::ActiveFlight& f) {
-  return {f.priors(), targets_of(f.plan), f.flown_time()};
+  return {f.priors(), flight::targets_of(f.plan), f.flown_time()};
 }
 
 flight::KeptFlight copy_of(const flight::ActiveFlight& f) {
@@ -108,7 +109,7 @@ nlohmann::ordered_json document_of(const flight::KeptFlight& f) {
           {"origin", {o.lat_deg, o.lon_deg, o.height_m}},
           {"home_m", {f.home_m.x(), f.home_m.y(), f.home_m.z()}},
           {"changes", changes_json(f.changes)},
-          {"targets", stored_targets(targets_of(f.plan))},
+          {"targets", stored_targets(flight::targets_of(f.plan))},
           {"forecast_at_start", forecast_json(f.forecast_at_start)},
           {"state", stored_state(f.state)},
           {"clues", stored_priors(f.priors)}};

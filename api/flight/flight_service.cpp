@@ -118,21 +118,16 @@ void FlightService::step() {
   // The estimates belong to the mission's strand, whose observer asks for our lock: never ask for both. Nor
   // is that strand waited for: safety is looked after here, whatever the estimator does.
   std::optional<MissionId> mission;
-  bool deciding = false;
   {
     const auto w = s.work.lock();
-    if (const auto& f = w->operations.flight()) {
-      mission = f->mission;
-      deciding = f->control.engine().state().step == procedure::Step::find_next_point;
-    }
+    mission = flight::wants_estimates(w->operations);
   }
   std::optional<MissionService::LiveView> live;
-  if (deciding) live = s.deps.missions.live_at_hand(*mission);
+  if (mission) live = s.deps.missions.live_at_hand(*mission);
   std::optional<flight::Operations::Estimates> estimates;
   if (live && live->origin) estimates = {*live->origin, std::move(live->estimates)};
   std::optional<State::ToKeep> keep;
-  std::optional<procedure::FlightPriors> priors;
-  std::optional<PlanTargets> targets;
+  flight::ForMission given;
   State::Due due;
   {
     auto w = s.work.lock();
@@ -148,14 +143,7 @@ void FlightService::step() {
       if (w->last.flight != w->operations.n_flights()) w->last = {.flight = w->operations.n_flights()};
       State::note_landing(*w, *f);
       keep = State::to_keep(*w, *f);
-      if (const auto version = f->control.engine().priors_version(); w->last.priors_passed != version) {
-        w->last.priors_passed = version;
-        priors = f->priors();
-      }
-      if (const auto n = f->changes.n; w->last.targets_passed != n) {
-        w->last.targets_passed = n;
-        targets = targets_of(f->plan);
-      }
+      given = w->hand_over.take(w->operations);
     }
     due = State::due(*w, now);
   }
@@ -169,8 +157,8 @@ void FlightService::step() {
     due_apart = State::apart_is_due(*w);
   }
   if (due_apart) s.deps.plan.post([&s] { s.work_apart(); });
-  if (targets && mission) s.deps.missions.set_targets(*mission, *std::move(targets));
-  if (priors && mission) s.deps.missions.set_priors(*mission, std::move(*priors));
+  if (given.targets && mission) s.deps.missions.set_targets(*mission, *std::move(given.targets));
+  if (given.priors && mission) s.deps.missions.set_priors(*mission, *std::move(given.priors));
   if (keep && mission) s.keep(*mission, *keep);
   s.changed.notify_all();
 }

@@ -14,6 +14,7 @@
 #include "api/planning/plan_json.hpp"
 #include "core/base/guard.hpp"
 #include "core/base/locked.hpp"
+#include "core/flight/hand_over.hpp"
 #include "core/flight/operations.hpp"
 
 namespace anchord::api {
@@ -34,9 +35,9 @@ struct FlightService::State {
       grid = profiles = false;
     }
   };
-  /// What of the present flight was kept, shown and told; each flight begins anew.
+  /// What of the present flight was kept and shown; each flight begins anew.
   struct Last {
-    std::uint64_t flight{0}, kept{~0ULL}, shown{~0ULL}, priors_passed{0}, targets_passed{~0ULL};
+    std::uint64_t flight{0}, kept{~0ULL}, shown{~0ULL};
     double shown_s{-10}, profiles_s{-10};
     bool flew{false};
   };
@@ -47,6 +48,7 @@ struct FlightService::State {
     flight::Operations operations;
     Apart apart;
     Last last;
+    flight::HandOver hand_over;
     std::vector<MissionId> landed;  ///< not asked for yet
     bool stopping{false};
   };

@@ -44,10 +44,6 @@ std::optional<flight::FlownTime> read_time(const Json& j) {
 
 }  // namespace
 
-PlanTargets targets_of(const Plan& plan) {
-  return {plan.settings.target_sigma_m, plan.anchor_target_sigma_m};
-}
-
 nlohmann::ordered_json stored_targets(const PlanTargets& targets) {
   Ordered anchors = Ordered::object();
   for (const auto& [id, sigma_m] : targets.of_anchor) anchors[to_string(id)] = sigma_m;

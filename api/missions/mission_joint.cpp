@@ -77,7 +77,7 @@ void MissionService::set_priors(const MissionId& id, procedure::FlightPriors pri
   if (!flight) return;
   {
     auto inbox = flight->inbox.lock();
-    inbox->new_priors = std::move(priors);
+    inbox->given.priors = std::move(priors);
   }
   state_->schedule(flight);
 }
@@ -87,22 +87,19 @@ void MissionService::set_targets(const MissionId& id, PlanTargets targets) {
   if (!flight) return;
   {
     auto inbox = flight->inbox.lock();
-    inbox->new_targets = std::move(targets);
+    inbox->given.targets = std::move(targets);
   }
   state_->schedule(flight);
 }
 
 /// What its flight found, and what is wanted of it, since the last rows.
 void MissionService::State::take_given(Flight& flight, Flight::Work& work) {
-  std::optional<procedure::FlightPriors> priors;
-  std::optional<PlanTargets> targets;
+  flight::ForMission given;
   {
     auto inbox = flight.inbox.lock();
-    priors = std::exchange(inbox->new_priors, std::nullopt);
-    targets = std::exchange(inbox->new_targets, std::nullopt);
+    given = std::exchange(inbox->given, {});
   }
-  if (priors) work.live.use_priors(*std::move(priors));
-  if (targets) work.live.use_targets(*std::move(targets));
+  flight::give(work.live, std::move(given));
 }
 
 }  // namespace anchord::api
