@@ -112,7 +112,7 @@ nlohmann::ordered_json document_of(const flight::KeptFlight& f) {
           {"targets", stored_targets(flight::targets_of(f.plan))},
           {"forecast_at_start", forecast_json(f.forecast_at_start)},
           {"state", stored_state(f.state)},
-          {"clues", stored_priors(f.priors)}};
+          {"priors", stored_priors(f.priors)}};
 }
 
 /// Nothing where the document is of another shape.
@@ -135,7 +135,7 @@ std::optional<flight::KeptFlight> kept_flight(const MissionId& mission, const nl
   out.aircraft = aircraft_of(j.value("aircraft", nlohmann::json()));
   out.changes = changes_of(j.value("changes", nlohmann::json()));
   out.forecast_at_start = forecast_of(j.value("forecast_at_start", nlohmann::json()));
-  out.priors = priors_of(j.value("clues", nlohmann::json()));
+  out.priors = priors_in_document(j);
   return out;
 }
 
@@ -189,8 +189,7 @@ void FlightService::State::recover() {
     auto j = nlohmann::json::parse(text, nullptr, false);
     if (j.is_object() && j.value("landed", false)) continue;
     deps.missions.prepare(mission);
-    deps.missions.set_priors(
-        mission, j.is_object() ? priors_of(j.value("clues", nlohmann::json())) : procedure::FlightPriors{});
+    deps.missions.set_priors(mission, priors_in_document(j));
     flying.emplace_back(mission, std::move(j));
   }
   std::vector<std::optional<flight::KeptFlight>> read;

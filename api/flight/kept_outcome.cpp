@@ -56,7 +56,7 @@ KeptOutcome kept_outcome(PlanStore& plans, const MissionId& mission) {
   if (!text || text.value().empty()) return out;
   const auto j = Json::parse(text.value(), nullptr, false);
   if (!j.is_object()) return out;
-  out.priors = priors_of(j.value("clues", Json()));
+  out.priors = priors_in_document(j);
   out.targets = read_targets(j.value("targets", Json()));
   out.time = read_time(j.value("time", Json()));
   return out;
@@ -64,7 +64,7 @@ KeptOutcome kept_outcome(PlanStore& plans, const MissionId& mission) {
 
 nlohmann::ordered_json stored_outcome(const KeptOutcome& outcome) {
   Ordered out{{"landed", true},
-              {"clues", stored_priors(outcome.priors)},
+              {"priors", stored_priors(outcome.priors)},
               {"targets", stored_targets(outcome.targets)}};
   if (const auto& time = outcome.time)
     out["time"] = {{"forecast", forecast_json(time->forecast)},

@@ -368,6 +368,11 @@ procedure::FlightPriors priors_of(const nlohmann::json& j) {
   return out;
 }
 
+procedure::FlightPriors priors_in_document(const nlohmann::json& j) {
+  if (!j.is_object()) return {};
+  return priors_of(j.value(j.contains("priors") ? "priors" : "clues", nlohmann::json()));
+}
+
 nlohmann::ordered_json flight_upload_json(const FlightUpload& upload) {
   return {{"what", upload.what},
           {"plan", to_string(upload.plan)},

@@ -89,5 +89,7 @@ std::optional<procedure::State> state_of(const nlohmann::json& json);
 /// Priors as they are kept with the mission, and back; entries of another shape are left out.
 nlohmann::ordered_json stored_priors(const procedure::FlightPriors& priors);
 procedure::FlightPriors priors_of(const nlohmann::json& json);
+/// Those of a whole kept document, also of one that an older server wrote.
+procedure::FlightPriors priors_in_document(const nlohmann::json& document);
 
 }  // namespace anchord::api

@@ -2,6 +2,7 @@
 #include <chrono>
 #include <future>
 
+#include "api/flight/kept_outcome.hpp"
 #include "core/flight/flown_time.hpp"
 #include "flights_fixture.hpp"
 
@@ -123,6 +124,19 @@ TEST_F(Flights, StartingAgainInTheAirNeedsAHomeOnTheGround) {
 }
 
 /// Both are of the flight as it was started: what comes of it later is compared with what was promised.
+TEST_F(Flights, PriorsThatWereKeptUnderTheirNameUpTo01AreRead) {
+  const MissionId id{parse_uuid(mission()).value()};
+  const std::string priors =
+      R"({"0x6a21":{"bearing":{"from":[51.0231,3.7131,60],"rad":1.2,"sigma_rad":0.4}}})";
+  auto& plans = database_->stores().plans;
+  for (const std::string name : {"clues", "priors"}) {
+    ASSERT_TRUE(plans.keep_procedure(id, R"({"landed":true,")" + name + "\":" + priors + "}", UtcTime{}));
+    const auto kept = api::kept_outcome(plans, id).priors;
+    ASSERT_EQ(kept.size(), 1u) << name;
+    EXPECT_EQ(kept.begin()->second.bearing->bearing_rad, 1.2) << name;
+  }
+}
+
 TEST_F(Flights, TheFlownTimeIsKeptBesideItsForecast) {
   mission_ = mission();
   const auto plan = make_plan();
