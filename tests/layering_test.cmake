@@ -105,7 +105,8 @@ set(api/formats_header "${api_header}")
 set(api/formats_source "^(nlohmann/json\\.hpp$|zlib\\.h$|zip\\.h$|pugixml\\.hpp$)")
 
 set(server/storage_header "^(${everywhere})")
-set(server/storage_source "^(sqlite3\\.h$|SQLiteCpp/|libpq-fe\\.h$|sys/|unistd\\.h$|fcntl\\.h$)")
+# Of JSON the one column that is GeoJSON.
+set(server/storage_source "^(nlohmann/json\\.hpp$|sqlite3\\.h$|SQLiteCpp/|libpq-fe\\.h$|sys/|unistd\\.h$|fcntl\\.h$)")
 
 # The one folder that knows the library of MQTT.
 set(server/mqtt_header "^(${everywhere})")

@@ -22,6 +22,7 @@
 #include "core/ports/measurement_store.hpp"
 #include "core/ports/mission_store.hpp"
 #include "core/ports/site_store.hpp"
+#include "core/types/geo_rings.hpp"
 
 namespace anchord::api {
 
@@ -179,9 +180,8 @@ struct MissionService::State : std::enable_shared_from_this<MissionService::Stat
   void forget_reads(const std::optional<MissionId>& id);
   std::shared_ptr<const std::string> replayed(const Mission& mission);
   std::optional<double> length_of(const MissionId& id) const;
-  static flight::LiveMission::JointProblem joint_problem(flight::LiveMission& live,
-                                                         const std::string& outline);
-  std::string outline_of(const Mission& mission) const;
+  static flight::LiveMission::JointProblem joint_problem(flight::LiveMission& live, const GeoRings& outline);
+  GeoRings outline_of(const Mission& mission) const;
   /// Counted, so that stop() can wait for it.
   void post(Executor& on, std::function<void()> task);
   flight::LiveMissionSetup setup_of(const Mission& mission) const;
