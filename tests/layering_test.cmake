@@ -105,7 +105,8 @@ set(api/formats_header "${api_header}")
 set(api/formats_source "^(nlohmann/json\\.hpp$|zlib\\.h$|zip\\.h$|pugixml\\.hpp$)")
 
 set(server/storage_header "^(${everywhere})")
-set(server/storage_source "^(sqlite3\\.h$|SQLiteCpp/|libpq-fe\\.h$|sys/|unistd\\.h$|fcntl\\.h$)")
+# Of JSON the one column that is GeoJSON.
+set(server/storage_source "^(nlohmann/json\\.hpp$|sqlite3\\.h$|SQLiteCpp/|libpq-fe\\.h$|sys/|unistd\\.h$|fcntl\\.h$)")
 
 # The one folder that knows the library of MQTT.
 set(server/mqtt_header "^(${everywhere})")
@@ -144,6 +145,7 @@ set(mutex_line "std::[a-z_]*mutex +[a-z0-9_]+ *[;,{=]")
 set(mutexes
   api/anchors/contradiction_watch.hpp:comparing_  # published anchors with later flights
   api/devices/device_stream.hpp:changing_         # whose the devices are: told to them and to the disk
+  api/flight/flight_state.hpp:publishing_         # events of a flight, in their order
   api/learning/model_registry.hpp:reloading_      # the promoted models
   api/missions/mission_service_state.hpp:reading_one  # a flight read back from the store
   api/webhooks/webhook_service.hpp:starting_      # the threads of webhooks: begun or joined

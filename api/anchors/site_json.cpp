@@ -33,7 +33,7 @@ Ordered wgs84_json(const std::optional<Wgs84>& at) {
 
 Ordered site_json(const Site& site) {
   Ordered out{{"id", to_string(site.id)}, {"name", site.name}, {"origin", wgs84_json(site.origin)}};
-  out["outline"] = kept_json(site.outline_geojson);
+  out["outline"] = polygon_of<Ordered>(site.outline);
   out["crs"] = {{"frame", site.crs_frame.empty() ? Ordered(nullptr) : Ordered(site.crs_frame)},
                 {"epoch", or_null(site.crs_epoch)},
                 {"base",
@@ -59,14 +59,15 @@ void patch_site(const Json& body, bool whole, Site& site, std::vector<FieldError
     site.origin.reset();
   }
   if (const Json* outline = fields.child("outline")) {
-    const bool polygon = outline->is_object() && outline->value("type", Json()) == "Polygon" &&
-                         outline->contains("coordinates") && (*outline)["coordinates"].is_array();
-    if (!polygon || to_wire(*outline).size() > 100'000)
-      fields.error("outline", "wrong_type", "must be a GeoJSON Polygon below 100 kB");
+    std::string wrong;
+    auto rings = rings_of(*outline, wrong);
+    if (!rings || to_wire(*outline).size() > 100'000)
+      errors.push_back({"/outline" + wrong, "wrong_type",
+                        "must be a GeoJSON Polygon below 100 kB, its corners [lon, lat] in degrees"});
     else
-      site.outline_geojson = to_wire(*outline);
+      site.outline = *std::move(rings);
   } else if (cleared("outline")) {
-    site.outline_geojson.clear();
+    site.outline.clear();
   }
   if (const Json* crs = fields.child("crs")) {
     Fields inner(*crs, "/crs", errors);

@@ -94,12 +94,11 @@ Json use_site_outline(bool wanted, std::span<const FlightData> flights, const st
   if (!site_id) return outline_provenance("none", nullptr, options, "the flights name no common site");
   const Json id = to_string(*site_id);
   const auto site = sites.site(*site_id);
-  if (!site || site.value().outline_geojson.empty())
+  if (!site || site.value().outline.empty())
     return outline_provenance("none", id, options, "the site has no outline");
   if (!origin && !frame)
     return outline_provenance("none", id, options, "flights in local metres, and no frame to put it in");
-  options.outline_m =
-      outline_in_enu(site.value().outline_geojson, origin ? *origin : frame->definition.origin);
+  options.outline_m = outline_in_enu(site.value().outline, origin ? *origin : frame->definition.origin);
   if (!origin) {
     for (Eigen::Vector2d& corner : options.outline_m) {
       const Eigen::Vector3d enu_m(corner.x(), corner.y(), 0);

@@ -187,7 +187,7 @@ Result<Report> calibration_report(CalibrationApi& api, const Calibration& calibr
   }
   if (report.site) {
     report.subtitle = report.site->name + ": " + report.subtitle;
-    if (report.origin) report.outline_m = outline_in_enu(report.site->outline_geojson, *report.origin);
+    if (report.origin) report.outline_m = outline_in_enu(report.site->outline, *report.origin);
   }
   BOOST_OUTCOME_TRY(const auto revisions, api.revisions.revisions(1000, 0));
   std::map<NetworkId, PublishedPosition> published;

@@ -17,6 +17,14 @@ namespace {
 
 constexpr double k_far_m = 20'000;  // of the origin, as for the track
 
+/// The name that a field comes under: its own, or its former one, which is deprecated.
+const char* name_in(Fields& fields, const char* name, const char* former) {
+  const bool has_name = fields.child(name) != nullptr, has_former = fields.child(former) != nullptr;
+  if (has_name && has_former)
+    fields.error(former, "conflict", std::string("is the former name of ") + name + ": send one of them");
+  return has_former ? former : name;
+}
+
 /// A word, or where to begin for each anchor that is named.
 void read_initial(Fields& fields, const Json& initial, FlightOptions& options,
                   std::vector<FieldError>& errors) {
@@ -113,11 +121,12 @@ CalibrationRequest read_calibration_request(const Json& body, std::vector<FieldE
     inner.finish();
   }
   if (const Json* initial = fields.child("initial")) read_initial(fields, *initial, options, errors);
-  if (const Json* priors = fields.child("clues")) read_priors(*priors, "/clues", options, errors);
+  const char* name = name_in(fields, "priors", "clues");
+  if (const Json* priors = fields.child(name)) read_priors(*priors, fields.pointer(name), options, errors);
   if (const Json* models = fields.child("models")) out.models = read_flight_models(*models, errors);
   // Kept with the settings and asked once everything is solved: no data.
   if (const Json* points = fields.child("check_points")) (void)read_check_points(*points, errors);
-  out.flight_priors = fields.boolean("flight_clues").value_or(true);
+  out.flight_priors = fields.boolean(name_in(fields, "flight_priors", "flight_clues")).value_or(true);
   out.compare_uncorrected = fields.boolean("compare_uncorrected").value_or(true);
   // Who names a loss wants it: the likelihood of the models then takes its place only where asked for.
   out.likelihood = out.models.likelihood.value_or(!fields.has("loss"));

@@ -502,8 +502,10 @@ void CalibrationService::conclude(const CalibrationRequest& request, const Model
       {"base", std::move(base)},
       {"budgets", std::move(budgets)},
       {"check_points", checked(request, out)},
-      {"n_clues", solved.n_priors},
+      {"n_priors", solved.n_priors},
+      {"n_clues", solved.n_priors},  // up to 0.1; with the one below, for clients of that contract
       {"frame", solved.frame ? frame_provenance(*solved.frame, out) : Json(nullptr)},
+      {"priors", {{"outline", solved.outline}}},
       {"clues", {{"outline", solved.outline}}},
       {"sigma_m", noise_provenance(request, solved.models)},
       {"models", models.predictor.empty() ? Json(nullptr) : Json(flight_models_json(models, solved.models))},

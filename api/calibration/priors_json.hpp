@@ -9,7 +9,7 @@
 
 namespace anchord::api {
 
-/// Priors about the side of the wall, as POST /calibrations and `anchord solve --clues` take them
+/// Priors about the side of the wall, as POST /calibrations and `anchord solve --priors` take them
 /// (docs/formats.md). Metres are those of the answers. What is wrong is appended to `errors`.
 void read_priors(const nlohmann::json& value, const std::string& base, FlightOptions& options,
                  std::vector<FieldError>& errors);

@@ -8,6 +8,7 @@
 #include "api/kit/late_writer.hpp"
 #include "api/planning/site_structures.hpp"
 #include "core/base/to_wire.hpp"
+#include "core/flight/hand_over.hpp"
 #include "core/ports/plan_store.hpp"
 
 namespace anchord::api {
@@ -82,11 +83,23 @@ flight::FlownChanges changes_of(const nlohmann::json& j) {
 }
 
 KeptOutcome outcome_of(const flight::ActiveFlight& f) {
-  return {f.priors(), targets_of(f.plan), f.flown_time()};
+  return {f.priors(), flight::targets_of(f.plan), f.flown_time()};
 }
 
-nlohmann::ordered_json document_of(const flight::ActiveFlight& f) {
-  const auto& o = f.frame.origin();
+flight::KeptFlight copy_of(const flight::ActiveFlight& f) {
+  return {.mission = f.mission,
+          .plan = f.plan,
+          .manual = f.manual,
+          .home_m = f.home_m,
+          .state = f.control.engine().state(),
+          .priors = f.priors(),
+          .aircraft = f.aircraft,
+          .changes = f.changes,
+          .forecast_at_start = f.forecast_at_start};
+}
+
+nlohmann::ordered_json document_of(const flight::KeptFlight& f) {
+  const Wgs84 o = f.plan.origin.value();
   const auto& a = f.aircraft;
   return {{"plan", nlohmann::json::parse(stored(f.plan).document.text)},
           {"plan_id", to_string(f.plan.id)},
@@ -96,10 +109,10 @@ nlohmann::ordered_json document_of(const flight::ActiveFlight& f) {
           {"origin", {o.lat_deg, o.lon_deg, o.height_m}},
           {"home_m", {f.home_m.x(), f.home_m.y(), f.home_m.z()}},
           {"changes", changes_json(f.changes)},
-          {"targets", stored_targets(targets_of(f.plan))},
+          {"targets", stored_targets(flight::targets_of(f.plan))},
           {"forecast_at_start", forecast_json(f.forecast_at_start)},
-          {"state", stored_state(f.control.engine().state())},
-          {"clues", stored_priors(f.priors())}};
+          {"state", stored_state(f.state)},
+          {"priors", stored_priors(f.priors)}};
 }
 
 /// Nothing where the document is of another shape.
@@ -122,22 +135,21 @@ std::optional<flight::KeptFlight> kept_flight(const MissionId& mission, const nl
   out.aircraft = aircraft_of(j.value("aircraft", nlohmann::json()));
   out.changes = changes_of(j.value("changes", nlohmann::json()));
   out.forecast_at_start = forecast_of(j.value("forecast_at_start", nlohmann::json()));
-  out.priors = priors_of(j.value("clues", nlohmann::json()));
+  out.priors = priors_in_document(j);
   return out;
 }
 
 }  // namespace
 
-bool FlightService::State::to_keep(Work& w, std::string& text) {
-  const auto& f = w.operations.flight();
-  if (!f) return false;
-  const auto n = f->control.engine().state().n_transitions + (f->aborted.empty() ? 0 : k_aborted) +
-                 k_change * (f->changes.n + f->changes.saved_revision + f->changes.n_anchor_orders);
-  if (n == w.last.kept) return false;
+std::optional<FlightService::State::ToKeep> FlightService::State::to_keep(Work& w,
+                                                                          const flight::ActiveFlight& f) {
+  const auto n = f.control.engine().state().n_transitions + (f.aborted.empty() ? 0 : k_aborted) +
+                 k_change * (f.changes.n + f.changes.saved_revision + f.changes.n_anchor_orders);
+  if (n == w.last.kept) return std::nullopt;
   w.last.kept = n;
   // What it found, what was wanted and how long it took outlive the flight: its calibrations ask for them.
-  text = to_wire(f->flying() ? document_of(*f) : stored_outcome(outcome_of(*f)));
-  return true;
+  if (f.flying()) return copy_of(f);
+  return outcome_of(f);
 }
 
 /// In memory before the disk has it.
@@ -159,7 +171,10 @@ std::optional<flight::FlownTime> FlightService::flown_time(const MissionId& miss
 }
 
 /// A disk that is slow or full makes no flight wait: what is written last is what a restart finds.
-void FlightService::State::keep(const MissionId& mission, std::string document) const {
+void FlightService::State::keep(const MissionId& mission, const ToKeep& what) const {
+  const auto* flying = std::get_if<flight::KeptFlight>(&what);
+  std::string document =
+      to_wire(flying != nullptr ? document_of(*flying) : stored_outcome(std::get<KeptOutcome>(what)));
   const auto write = [&plans = deps.plans, mission, document = std::move(document), now = deps.clock.now()] {
     return plans.keep_procedure(mission, document, now);
   };
@@ -174,8 +189,7 @@ void FlightService::State::recover() {
     auto j = nlohmann::json::parse(text, nullptr, false);
     if (j.is_object() && j.value("landed", false)) continue;
     deps.missions.prepare(mission);
-    deps.missions.set_priors(
-        mission, j.is_object() ? priors_of(j.value("clues", nlohmann::json())) : procedure::FlightPriors{});
+    deps.missions.set_priors(mission, priors_in_document(j));
     flying.emplace_back(mission, std::move(j));
   }
   std::vector<std::optional<flight::KeptFlight>> read;
@@ -184,17 +198,16 @@ void FlightService::State::recover() {
     // A flight goes on without walls rather than not at all; its own areas are in its plan.
     if (read.back()) (void)deps.structures.join(read.back()->plan).has_value();
   }
-  auto w = work.lock();
   for (std::size_t i = 0; i < flying.size(); ++i) {
-    const auto& mission = flying[i].first;
     if (auto& found = read[i]) {
-      (void)w->operations.recover(now(), *std::move(found)).has_value();
+      operate([&](auto& operations, const auto& at) {
+        return operations.recover(at, *std::move(found)).has_value();
+      });
     } else {
       deps.events.add(EventLevel::critical, "procedure.lost",
-                      "the flight before the restart cannot be read: the pilot has it", mission);
+                      "the flight before the restart cannot be read: the pilot has it", flying[i].first);
     }
   }
-  publish_events(*w);
 }
 
 }  // namespace anchord::api

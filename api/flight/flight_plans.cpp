@@ -91,11 +91,10 @@ Result<FlightService::PlanDifference> FlightService::take_plan(const MissionId& 
     // basis.
     auto proposal = flight::propose_change(*basis, wanted);
     BOOST_OUTCOME_TRYV(as_seen(order, proposal));
-    auto w = state_->work.lock();
-    BOOST_OUTCOME_TRY(const bool taken,
-                      w->operations.take_plan(state_->now(), mission, *basis, proposal, who.name));
+    BOOST_OUTCOME_TRY(const bool taken, state_->operate([&](auto& operations, const auto& now) {
+      return operations.take_plan(now, mission, *basis, proposal, who.name);
+    }));
     if (!taken) continue;
-    state_->publish_events(*w);
     return PlanDifference{std::move(basis->plan), std::move(proposal)};
   }
   return cannot("the flight moves on faster than the change can be checked: hold, then take it");
@@ -115,16 +114,17 @@ Result<void> FlightService::order_anchor(const MissionId& mission, NetworkId anc
                       ", its position may be far off: fly where it is seen from another side, or give it up");
     }
   }
-  auto w = state_->work.lock();
-  BOOST_OUTCOME_TRYV(w->operations.order_anchor(state_->now(), mission, anchor, order, who.name));
-  state_->publish_events(*w);
-  return boost::outcome_v2::success();
+  return state_->operate([&](auto& operations, const auto& now) {
+    return operations.order_anchor(now, mission, anchor, order, who.name);
+  });
 }
 
 void FlightService::plan_saved(const Plan& plan) {
-  auto w = state_->work.lock();
-  w->operations.plan_saved(plan.id, plan.name, plan.version);
-  state_->publish_events(*w);
+  {
+    auto w = state_->work.lock();
+    w->operations.plan_saved(plan.id, plan.name, plan.version);
+  }
+  state_->publish_events();
 }
 
 }  // namespace anchord::api

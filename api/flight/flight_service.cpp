@@ -37,8 +37,14 @@ flight::Now FlightService::State::now() const {
   return out;
 }
 
-void FlightService::State::publish_events(Work& w) const {
-  for (auto& event : w.operations.take_events())
+void FlightService::State::publish_events() {
+  const std::scoped_lock one_at_a_time(publishing_);
+  std::vector<flight::LogEvent> events;
+  {
+    auto w = work.lock();
+    events = w->operations.take_events();
+  }
+  for (auto& event : events)
     deps.events.add(event.level, std::move(event.code), std::move(event.text), event.mission);
 }
 
@@ -112,23 +118,17 @@ void FlightService::step() {
   // The estimates belong to the mission's strand, whose observer asks for our lock: never ask for both. Nor
   // is that strand waited for: safety is looked after here, whatever the estimator does.
   std::optional<MissionId> mission;
-  bool deciding = false;
   {
     const auto w = s.work.lock();
-    if (const auto& f = w->operations.flight()) {
-      mission = f->mission;
-      deciding = f->control.engine().state().step == procedure::Step::find_next_point;
-    }
+    mission = flight::wants_estimates(w->operations);
   }
   std::optional<MissionService::LiveView> live;
-  if (deciding) live = s.deps.missions.live_at_hand(*mission);
+  if (mission) live = s.deps.missions.live_at_hand(*mission);
   std::optional<flight::Operations::Estimates> estimates;
   if (live && live->origin) estimates = {*live->origin, std::move(live->estimates)};
-  std::string keep;
-  bool keeps = false;
-  std::optional<procedure::FlightPriors> priors;
-  std::optional<PlanTargets> targets;
-  bool due_apart = false;
+  std::optional<State::ToKeep> keep;
+  flight::ForMission given;
+  State::Due due;
   {
     auto w = s.work.lock();
     const auto now = s.now();
@@ -138,28 +138,28 @@ void FlightService::step() {
       s.checks_apart.pause();
     w->operations.round(now, estimates, live.has_value());
     if (auto task = w->operations.take_point_task()) w->apart.point = std::move(task);
-    s.publish_events(*w);
     if (const auto& f = w->operations.flight()) {
       mission = f->mission;  // one that began meanwhile too
       if (w->last.flight != w->operations.n_flights()) w->last = {.flight = w->operations.n_flights()};
       State::note_landing(*w, *f);
-      keeps = State::to_keep(*w, keep);
-      if (const auto version = f->control.engine().priors_version(); w->last.priors_passed != version) {
-        w->last.priors_passed = version;
-        priors = f->priors();
-      }
-      if (const auto n = f->changes.n; w->last.targets_passed != n) {
-        w->last.targets_passed = n;
-        targets = targets_of(f->plan);
-      }
+      keep = State::to_keep(*w, *f);
+      given = w->hand_over.take(w->operations);
     }
-    s.publish(*w);
+    due = State::due(*w, now);
+  }
+  s.publish_events();
+  if (due.procedure) s.publish(*due.procedure);
+  bool due_apart = false;
+  {
+    auto w = s.work.lock();
+    w->apart.grid |= due.grid;
+    w->apart.profiles |= due.profiles;
     due_apart = State::apart_is_due(*w);
   }
   if (due_apart) s.deps.plan.post([&s] { s.work_apart(); });
-  if (targets && mission) s.deps.missions.set_targets(*mission, *std::move(targets));
-  if (priors && mission) s.deps.missions.set_priors(*mission, std::move(*priors));
-  if (keeps && mission) s.keep(*mission, std::move(keep));
+  if (given.targets && mission) s.deps.missions.set_targets(*mission, *std::move(given.targets));
+  if (given.priors && mission) s.deps.missions.set_priors(*mission, *std::move(given.priors));
+  if (keep && mission) s.keep(*mission, *keep);
   s.changed.notify_all();
 }
 
@@ -191,12 +191,9 @@ void FlightService::on_range(const MissionId& mission, const RangeResult& result
 
 Result<Lease> FlightService::take_control(const MissionId& mission, const Principal& who, bool by_force) {
   BOOST_OUTCOME_TRYV(state_->deps.missions.mission(mission));
-  auto w = state_->work.lock();
-  const auto now = state_->now();
-  auto lease =
-      w->operations.take_control(now, mission, holder_of(who), by_force, to_string(make_uuid_v7(now.utc)));
-  state_->publish_events(*w);
-  return lease;
+  return state_->operate([&](auto& operations, const auto& now) {
+    return operations.take_control(now, mission, holder_of(who), by_force, to_string(make_uuid_v7(now.utc)));
+  });
 }
 
 Result<Lease> FlightService::renew_control(const MissionId& mission, const std::string& key,
@@ -207,10 +204,9 @@ Result<Lease> FlightService::renew_control(const MissionId& mission, const std::
 
 Result<void> FlightService::release_control(const MissionId& mission, const std::string& key,
                                             const Principal& who) {
-  auto w = state_->work.lock();
-  auto released = w->operations.release_control(state_->now(), mission, key, holder_of(who));
-  state_->publish_events(*w);
-  return released;
+  return state_->operate([&](auto& operations, const auto& now) {
+    return operations.release_control(now, mission, key, holder_of(who));
+  });
 }
 
 std::optional<Lease> FlightService::control() {
@@ -261,13 +257,11 @@ Result<FlightCommand> FlightService::act(const MissionId& mission, const Order& 
   }
   std::optional<flight::Groundwork> ground;
   if (plan) ground = state_->groundwork(&*plan);
-  auto w = state_->work.lock();
-  auto& operations = w->operations;
-  const auto now = state_->now();
-  BOOST_OUTCOME_TRYV(operations.renew_control(now, mission, order.lease, holder_of(who)));
-  auto given = ground ? operations.begin(now, record, *ground, order.manual, who.name)
-                      : operations.act(now, mission, order.action, who.name);
-  state_->publish_events(*w);
+  auto given = state_->operate([&](auto& operations, const auto& now) -> Result<FlightCommand> {
+    BOOST_OUTCOME_TRYV(operations.renew_control(now, mission, order.lease, holder_of(who)));
+    return ground ? operations.begin(now, record, *ground, order.manual, who.name)
+                  : operations.act(now, mission, order.action, who.name);
+  });
   state_->changed.notify_all();
   return given;
 }
@@ -287,11 +281,10 @@ Result<FlightCommand> FlightService::upload(const MissionId& mission, const std:
 Result<DroneStatus> FlightService::change_aircraft(const MissionId& mission, const std::string& lease,
                                                    const std::string& sender, const Principal& who) {
   BOOST_OUTCOME_TRYV(state_->deps.missions.mission(mission));
-  auto w = state_->work.lock();
-  BOOST_OUTCOME_TRYV(w->operations.renew_control(state_->now(), mission, lease, holder_of(who)));
-  auto changed = w->operations.change_aircraft(mission, sender, who.name);
-  state_->publish_events(*w);
-  return changed;
+  return state_->operate([&](auto& operations, const auto& now) -> Result<DroneStatus> {
+    BOOST_OUTCOME_TRYV(operations.renew_control(now, mission, lease, holder_of(who)));
+    return operations.change_aircraft(mission, sender, who.name);
+  });
 }
 
 std::vector<FlightUpload> FlightService::uploads(const MissionId& mission) {
@@ -345,10 +338,9 @@ Result<void> FlightService::override_item(const MissionId& mission, const std::s
   if (!flight::is_checklist_item(item))
     return make_error(Errc::not_found, "the checklist has no item " + item);
   const auto ground = state_->groundwork(nullptr);
-  auto w = state_->work.lock();
-  auto done = w->operations.override_item(state_->now(), mission, item, reason, who.name, ground);
-  state_->publish_events(*w);
-  return done;
+  return state_->operate([&](auto& operations, const auto& now) {
+    return operations.override_item(now, mission, item, reason, who.name, ground);
+  });
 }
 
 std::vector<std::pair<std::string_view, std::string>> FlightService::alarms() {

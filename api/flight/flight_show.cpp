@@ -56,9 +56,8 @@ std::optional<Profiles> profiles_in(State& state, const MissionId& mission) {
 
 }  // namespace
 
-nlohmann::ordered_json FlightService::State::procedure(const flight::Operations& operations,
-                                                       const flight::ActiveFlight& f) const {
-  const auto at = now();
+ProcedureView FlightService::State::procedure(const flight::Now& at, const flight::Operations& operations,
+                                              const flight::ActiveFlight& f) {
   ProcedureView v;
   v.mission = f.mission;
   v.plan = f.plan.id.uuid == Uuid{} ? "" : to_string(f.plan.id);
@@ -85,32 +84,37 @@ nlohmann::ordered_json FlightService::State::procedure(const flight::Operations&
   }
   if (v.commands.size() > k_shown_commands)
     v.commands.erase(v.commands.begin(), v.commands.end() - k_shown_commands);
-  return procedure_json(v, f.control.engine(), f.frame);
+  read_engine(f.control.engine(), f.frame, v);
+  return v;
 }
 
 /// The stepper once a second and with every transition. What is longer to write is left to be shown apart:
 /// decisions once, profiles while they grow.
-void FlightService::State::publish(Work& w) const {
+FlightService::State::Due FlightService::State::due(Work& w, const flight::Now& at) {
+  Due out;
   const bool soon = w.operations.take_shown_soon();
-  if (!w.operations.flight()) return;
+  if (!w.operations.flight()) return out;
   const auto& f = *w.operations.flight();
-  const auto at = now();
   const auto& engine = f.control.engine();
   const auto n = engine.state().n_transitions;
   const bool moved = n != w.last.shown;
   if (moved || soon || at.s - w.last.shown_s >= 1) {
-    deps.hub.publish(Topic::procedure, to_wire(procedure(w.operations, f)), at.utc.us(),
-                     to_string(f.mission));
+    out.procedure = procedure(at, w.operations, f);
     w.last.shown_s = at.s;
   }
   const auto step = engine.state().step;
   const bool growing = step == procedure::Step::turn || step == procedure::Step::height_search;
   if (moved || (growing && at.s - w.last.profiles_s >= k_profiles_s)) {
-    w.apart.profiles = true;
+    out.profiles = true;
     w.last.profiles_s = at.s;
   }
-  if (moved && engine.decision()) w.apart.grid = true;
+  out.grid = moved && engine.decision();
   w.last.shown = n;
+  return out;
+}
+
+void FlightService::State::publish(const ProcedureView& view) const {
+  deps.hub.publish(Topic::procedure, to_wire(procedure_json(view)), view.t_us, to_string(view.mission));
 }
 
 void FlightService::State::show_grid(Guard& w) const {
@@ -135,9 +139,14 @@ void FlightService::State::show_profiles(Guard& w) const {
 }
 
 std::string FlightService::procedure_text(const MissionId& mission) {
-  const auto w = state_->work.lock();
-  const auto* f = w->operations.flight_of(mission);
-  return f == nullptr ? std::string{} : to_wire(state_->procedure(w->operations, *f));
+  std::optional<ProcedureView> view;
+  {
+    const auto w = state_->work.lock();
+    const auto* f = w->operations.flight_of(mission);
+    if (f == nullptr) return {};
+    view = State::procedure(state_->now(), w->operations, *f);
+  }
+  return to_wire(procedure_json(*view));
 }
 
 std::string FlightService::grid_text(const MissionId& mission) {

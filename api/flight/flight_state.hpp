@@ -2,19 +2,22 @@
 
 #include <condition_variable>
 #include <deque>
+#include <mutex>
+#include <variant>
 
 #include "api/flight/flight_service.hpp"
 #include "api/flight/interval_histogram.hpp"
+#include "api/flight/kept_outcome.hpp"
+#include "api/flight/procedure_json.hpp"
 #include "api/kit/storage_status.hpp"
 #include "api/missions/mission_service.hpp"
 #include "api/planning/plan_json.hpp"
 #include "core/base/guard.hpp"
 #include "core/base/locked.hpp"
+#include "core/flight/hand_over.hpp"
 #include "core/flight/operations.hpp"
 
 namespace anchord::api {
-
-struct KeptOutcome;
 
 /// The shell round flight::Operations: thread, clocks, lock; what is shown (flight_show.cpp) and kept
 /// (flight_kept.cpp).
@@ -32,25 +35,39 @@ struct FlightService::State {
       grid = profiles = false;
     }
   };
-  /// What of the present flight was kept, shown and told; each flight begins anew.
+  /// What of the present flight was kept and shown; each flight begins anew.
   struct Last {
-    std::uint64_t flight{0}, kept{~0ULL}, shown{~0ULL}, priors_passed{0}, targets_passed{~0ULL};
+    std::uint64_t flight{0}, kept{~0ULL}, shown{~0ULL};
     double shown_s{-10}, profiles_s{-10};
     bool flew{false};
   };
-  /// What rounds, requests and measurements share. No disk, no estimate and nothing long while it is held.
+  /// What rounds, requests and measurements share. No disk, no estimate, no JSON, no message and nothing long
+  /// while it is held: values are copied, and written without it.
   struct Work {
     Work(Drone* drone, bool decides_apart) : operations(drone, decides_apart) {}
     flight::Operations operations;
     Apart apart;
     Last last;
+    flight::HandOver hand_over;
     std::vector<MissionId> landed;  ///< not asked for yet
     bool stopping{false};
   };
   using Guard = Locked<Work>::Exclusive;
 
   flight::Now now() const;
-  void publish_events(Work& w) const;
+  /// What happened since the last call, to the event log, in its order whoever calls. Without the lock.
+  void publish_events();
+  /// An operator's or a round's act under the lock, and then what happened by it.
+  template <class Act>
+  auto operate(Act act) {
+    const auto acted = [&] {
+      auto w = work.lock();
+      return act(w->operations, now());
+    };
+    auto out = acted();
+    publish_events();
+    return out;
+  }
   /// Whether what is due apart has to be handed to the executor (by the caller, without the lock).
   static bool apart_is_due(Work& w);
   /// All that is due, with the lock given away meanwhile.
@@ -60,18 +77,27 @@ struct FlightService::State {
   flight::Groundwork groundwork(const Plan* plan);
   Result<Plan> wanted_plan(const MissionId& mission, bool undo);
   void recover();
-  /// The document to store, when the machine moved since the last call.
-  static bool to_keep(Work& w, std::string& text);
+  using ToKeep = std::variant<flight::KeptFlight, KeptOutcome>;
+  /// What to store, when the machine moved since the last call.
+  static std::optional<ToKeep> to_keep(Work& w, const flight::ActiveFlight& f);
   static void note_landing(Work& w, const flight::ActiveFlight& f);
   template <class Part>
   Part outcome(const MissionId& mission, Part KeptOutcome::*part);
-  void keep(const MissionId& mission, std::string document) const;
-  nlohmann::ordered_json procedure(const flight::Operations& operations, const flight::ActiveFlight& f) const;
-  void publish(Work& w) const;
+  void keep(const MissionId& mission, const ToKeep& what) const;
+  static ProcedureView procedure(const flight::Now& at, const flight::Operations& operations,
+                                 const flight::ActiveFlight& f);
+  /// What is to be shown after a round.
+  struct Due {
+    std::optional<ProcedureView> procedure{};
+    bool grid{false}, profiles{false};  ///< apart, once the procedure was
+  };
+  static Due due(Work& w, const flight::Now& at);
+  void publish(const ProcedureView& view) const;
   void show_grid(Guard& w) const;
   void show_profiles(Guard& w) const;
 
   Deps deps;
+  std::mutex publishing_;  ///< events, in their order; taken before the work
   Locked<Work> work;
   std::condition_variable wake, changed, idle;
   Thread thread;

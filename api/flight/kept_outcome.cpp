@@ -44,10 +44,6 @@ std::optional<flight::FlownTime> read_time(const Json& j) {
 
 }  // namespace
 
-PlanTargets targets_of(const Plan& plan) {
-  return {plan.settings.target_sigma_m, plan.anchor_target_sigma_m};
-}
-
 nlohmann::ordered_json stored_targets(const PlanTargets& targets) {
   Ordered anchors = Ordered::object();
   for (const auto& [id, sigma_m] : targets.of_anchor) anchors[to_string(id)] = sigma_m;
@@ -60,7 +56,7 @@ KeptOutcome kept_outcome(PlanStore& plans, const MissionId& mission) {
   if (!text || text.value().empty()) return out;
   const auto j = Json::parse(text.value(), nullptr, false);
   if (!j.is_object()) return out;
-  out.priors = priors_of(j.value("clues", Json()));
+  out.priors = priors_in_document(j);
   out.targets = read_targets(j.value("targets", Json()));
   out.time = read_time(j.value("time", Json()));
   return out;
@@ -68,7 +64,7 @@ KeptOutcome kept_outcome(PlanStore& plans, const MissionId& mission) {
 
 nlohmann::ordered_json stored_outcome(const KeptOutcome& outcome) {
   Ordered out{{"landed", true},
-              {"clues", stored_priors(outcome.priors)},
+              {"priors", stored_priors(outcome.priors)},
               {"targets", stored_targets(outcome.targets)}};
   if (const auto& time = outcome.time)
     out["time"] = {{"forecast", forecast_json(time->forecast)},

@@ -21,7 +21,6 @@ KeptOutcome kept_outcome(PlanStore& plans, const MissionId& mission);
 /// Of a flight that has ended, as it is kept.
 nlohmann::ordered_json stored_outcome(const KeptOutcome& outcome);
 
-PlanTargets targets_of(const Plan& plan);
 nlohmann::ordered_json stored_targets(const PlanTargets& targets);
 nlohmann::ordered_json forecast_json(const std::optional<planning::FlightTime>& forecast);
 std::optional<planning::FlightTime> forecast_of(const nlohmann::json& json);

@@ -19,34 +19,31 @@ double degrees(double rad) {
 Ordered finite_or_null(double value) { return std::isfinite(value) ? Ordered(value) : Ordered(nullptr); }
 Ordered xyz(const Eigen::Vector3d& p) { return Ordered{p.x(), p.y(), p.z()}; }
 
-/// A point of the plan as maps and tables want it. Heights above the plan's ground are the local z: the
-/// earth's curve is below a centimetre within 300 m.
-Ordered place(const Eigen::Vector3d& enu_m, const EnuFrame& frame) {
-  const Wgs84 at = frame.wgs84_from_enu(Enu{enu_m});
+/// A point of the plan, and where it is, as maps and tables want it. Heights above the plan's ground are the
+/// local z: the earth's curve is below a centimetre within 300 m.
+Ordered place(const Eigen::Vector3d& enu_m, const Wgs84& at) {
   return {
       {"lon", at.lon_deg}, {"lat", at.lat_deg}, {"height_above_ground_m", enu_m.z()}, {"enu_m", xyz(enu_m)}};
 }
 
-Ordered anchors_json(const procedure::FlightEngine& engine) {
+Ordered anchors_json(const ProcedureView& v) {
   Ordered out = Ordered::array();
-  for (const auto& a : engine.state().anchors) {
-    const auto priors = engine.priors().find(a.id);
-    const bool known = priors != engine.priors().end();
-    const auto bearing = known ? priors->second.bearing : std::nullopt;
-    const auto height = known ? priors->second.height : std::nullopt;
+  for (std::size_t i = 0; i < v.anchors.size(); ++i) {
+    const auto& a = v.state.anchors[i];
+    const auto& more = v.anchors[i];
     out.push_back({{"network_id", to_string(a.id)},
                    {"done", a.done},
                    {"reached", a.reached},
                    {"ended_by", a.ended_by.empty() ? Ordered(nullptr) : Ordered(a.ended_by)},
                    {"accepted", a.accepted},
-                   {"target_sigma_m", or_null(engine.setup().exit_rule(a.id).target_sigma_m)},
+                   {"target_sigma_m", or_null(more.target_sigma_m)},
                    {"why", a.why},
                    {"iterations", a.iterations},
                    {"waiting", a.waiting},
                    {"weight", procedure::weight_of(a)},
-                   {"bearing_deg", bearing ? Ordered(degrees(bearing->bearing_rad)) : Ordered(nullptr)},
-                   {"height_m", height ? Ordered(height->height_m) : Ordered(nullptr)},
-                   {"height_at_edge", height ? Ordered(height->at_edge) : Ordered(nullptr)},
+                   {"bearing_deg", more.bearing_rad ? Ordered(degrees(*more.bearing_rad)) : Ordered(nullptr)},
+                   {"height_m", or_null(more.height_m)},
+                   {"height_at_edge", or_null(more.height_at_edge)},
                    {"no_lobe", a.no_lobe}});
   }
   return out;
@@ -101,16 +98,39 @@ Ordered flight_command_json(const FlightCommand& c) {
           {"text", c.text},     {"by", c.by},         {"t_us", c.at.us()}};
 }
 
-Ordered procedure_json(const ProcedureView& v, const procedure::FlightEngine& engine, const EnuFrame& frame) {
-  const auto& s = engine.state();
-  const auto& t = engine.setup().settings;
+void read_engine(const procedure::FlightEngine& engine, const EnuFrame& frame, ProcedureView& view) {
+  const auto& setup = engine.setup();
+  view.state = engine.state();
+  const auto& s = view.state;
+  for (const auto& task : s.anchors) {
+    auto& one = view.anchors.emplace_back();
+    one.target_sigma_m = setup.exit_rule(task.id).target_sigma_m;
+    const auto priors = engine.priors().find(task.id);
+    if (priors == engine.priors().end()) continue;
+    if (const auto& bearing = priors->second.bearing) one.bearing_rad = bearing->bearing_rad;
+    if (const auto& height = priors->second.height) {
+      one.height_m = height->height_m;
+      one.height_at_edge = height->at_edge;
+    }
+  }
   const bool flying = s.step != Step::ready && s.step != Step::done;
+  if (flying && s.n_transitions > 0) view.target = frame.wgs84_from_enu(Enu{s.target_m});
+  if (flying) view.distance_m = engine.distance_left_m();
+  view.target_sigma_m = setup.exit.target_sigma_m;
+  if (const auto at = engine.position_m()) view.battery_needed = procedure::return_margin(setup.limits, *at);
+  view.elapsed_s = engine.flown_s(view.now_s);
+  view.n_waypoints = setup.settings.waypoints.size();
+  view.k = setup.settings.k;
+  view.alarm = engine.alarm();
+}
+
+Ordered procedure_json(const ProcedureView& v) {
+  const auto& s = v.state;
   Ordered target(nullptr);
-  if (flying && s.n_transitions > 0) {
-    target = place(s.target_m, frame);
+  if (v.target) {
+    target = place(s.target_m, *v.target);
     target["heading_deg"] = s.heading_rad ? Ordered(degrees(*s.heading_rad)) : Ordered(nullptr);
   }
-  const auto at = engine.position_m();
   Ordered commands = Ordered::array();
   for (const auto& c : v.commands) commands.push_back(flight_command_json(c));
   Ordered out{{"mission", to_string(v.mission)},
@@ -128,26 +148,25 @@ Ordered procedure_json(const ProcedureView& v, const procedure::FlightEngine& en
               {"ended", v.ended.empty() ? Ordered(nullptr) : Ordered(v.ended)},
               {"in_step_s", std::max(0.0, v.now_s - s.since_s)},
               {"step_limit_s", s.deadline_s > 0 ? Ordered(s.deadline_s - s.since_s) : Ordered(nullptr)},
-              {"target_sigma_m", or_null(engine.setup().exit.target_sigma_m)},
-              {"elapsed_s", finite_or_null(engine.flown_s(v.now_s))},
+              {"target_sigma_m", or_null(v.target_sigma_m)},
+              {"elapsed_s", finite_or_null(v.elapsed_s)},
               {"forecast_s", v.forecast ? Ordered{{"low", v.forecast->low_s},
                                                   {"expected", v.forecast->expected_s},
                                                   {"high", v.forecast->high_s}}
                                         : Ordered(nullptr)},
               {"waypoint", s.waypoint + 1},
-              {"n_waypoints", t.waypoints.size()},
+              {"n_waypoints", v.n_waypoints},
               {"part", s.steps},
-              {"k", t.k},
+              {"k", v.k},
               {"iteration", s.visited.size()},
               {"target", std::move(target)},
-              {"distance_m", flying ? or_null(engine.distance_left_m()) : Ordered(nullptr)},
-              {"anchors", anchors_json(engine)}};
-  out["battery_needed"] =
-      at ? Ordered(procedure::return_margin(engine.setup().limits, *at)) : Ordered(nullptr);
-  out["alarm"] = engine.alarm() ? Ordered{{"id", engine.alarm()->id},
-                                          {"reaction", procedure::to_string(engine.alarm()->reaction)},
-                                          {"text", engine.alarm()->text}}
-                                : Ordered(nullptr);
+              {"distance_m", or_null(v.distance_m)},
+              {"anchors", anchors_json(v)}};
+  out["battery_needed"] = or_null(v.battery_needed);
+  out["alarm"] = v.alarm ? Ordered{{"id", v.alarm->id},
+                                   {"reaction", procedure::to_string(v.alarm->reaction)},
+                                   {"text", v.alarm->text}}
+                         : Ordered(nullptr);
   out["shift_m"] = v.shift_m ? xyz(*v.shift_m) : Ordered(nullptr);
   out["drone"] = v.drone ? drone_json(*v.drone) : Ordered(nullptr);
   out["control"] =
@@ -168,7 +187,7 @@ Ordered grid_json(const GridView& v) {
   const auto& record = v.decision;
   if (record) {
     for (const auto& c : record->decision.candidates) {
-      Ordered one = place(c.point_m, v.frame);
+      Ordered one = place(c.point_m, v.frame.wgs84_from_enu(Enu{c.point_m}));
       one["value"] = finite_or_null(c.value);
       one["p_nlos"] = finite_or_null(c.p_nlos);
       one["flight_s"] = finite_or_null(c.flight_s);
@@ -347,6 +366,11 @@ procedure::FlightPriors priors_of(const nlohmann::json& j) {
     }
   }
   return out;
+}
+
+procedure::FlightPriors priors_in_document(const nlohmann::json& j) {
+  if (!j.is_object()) return {};
+  return priors_of(j.value(j.contains("priors") ? "priors" : "clues", nlohmann::json()));
 }
 
 nlohmann::ordered_json flight_upload_json(const FlightUpload& upload) {

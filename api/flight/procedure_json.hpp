@@ -25,7 +25,8 @@ nlohmann::ordered_json flight_command_json(const FlightCommand& command);
 nlohmann::ordered_json flight_upload_json(const FlightUpload& upload);
 nlohmann::ordered_json checklist_json(const std::vector<ChecklistItem>& items);
 
-/// What stands beside the machine's state in the message of topic `procedure`.
+/// The message of topic `procedure`, as plain values: copied while a flight is locked, written when it no
+/// longer is.
 struct ProcedureView {
   MissionId mission{};
   std::string plan;  ///< id, or empty
@@ -45,9 +46,24 @@ struct ProcedureView {
   std::optional<std::string> holder{};
   std::int64_t holder_since_us{}, holder_until_us{};
   std::vector<FlightCommand> commands;
+
+  procedure::State state;
+  /// What is known beside its task; one for each of state.anchors, in their order.
+  struct Anchor {
+    std::optional<double> target_sigma_m{}, bearing_rad{}, height_m{};
+    std::optional<bool> height_at_edge{};
+  };
+  std::vector<Anchor> anchors;
+  std::optional<Wgs84> target{};  ///< of state.target_m
+  std::optional<double> target_sigma_m{}, distance_m{}, battery_needed{};
+  double elapsed_s{};
+  std::size_t n_waypoints{};
+  int k{};
+  std::optional<procedure::Alarm> alarm{};
 };
-nlohmann::ordered_json procedure_json(const ProcedureView& view, const procedure::FlightEngine& engine,
-                                      const EnuFrame& frame);
+/// What the engine knows, into the view; `view.now_s` is set.
+void read_engine(const procedure::FlightEngine& engine, const EnuFrame& frame, ProcedureView& view);
+nlohmann::ordered_json procedure_json(const ProcedureView& view);
 /// Topic mission.grid: the last decision with every candidate. A copy of what it is made of, since it is long
 /// to write.
 struct GridView {
@@ -73,5 +89,7 @@ std::optional<procedure::State> state_of(const nlohmann::json& json);
 /// Priors as they are kept with the mission, and back; entries of another shape are left out.
 nlohmann::ordered_json stored_priors(const procedure::FlightPriors& priors);
 procedure::FlightPriors priors_of(const nlohmann::json& json);
+/// Those of a whole kept document, also of one that an older server wrote.
+procedure::FlightPriors priors_in_document(const nlohmann::json& document);
 
 }  // namespace anchord::api

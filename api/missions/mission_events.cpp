@@ -2,17 +2,26 @@
 #include "api/missions/mission_observer.hpp"
 #include "api/missions/mission_service_state.hpp"
 #include "api/stream/hub.hpp"
+#include "core/flight/hand_over.hpp"
 
 namespace anchord::api {
 
 void MissionService::State::publish_events(Flight& flight, Flight::Work& work) {
   if (!work.live.has_events()) return;
-  for (const auto& event : work.live.take_events())
+  auto* pilot = observer.load();
+  for (const auto& event : work.live.take_events()) {
+    if (pilot != nullptr) flight::report(*pilot, flight.id, event);
     std::visit([&](const auto& one) { publish(flight, one); }, event);
+  }
 }
 
-void MissionService::State::publish(const Flight&, const flight::FixBelieved& event) const {
-  if (auto* pilot = observer.load()) pilot->on_fix(event.fix);
+void MissionService::State::publish_events(const Flight& flight,
+                                           const std::vector<flight::PositionEvent>& events) const {
+  auto* pilot = observer.load();
+  for (const auto& event : events) {
+    if (pilot != nullptr) flight::report(*pilot, event);
+    std::visit([&](const auto& one) { publish(flight, one); }, event);
+  }
 }
 
 void MissionService::State::publish(const Flight& flight, const flight::FixShown& event) const {
@@ -28,7 +37,6 @@ void MissionService::State::publish(const Flight& flight, const flight::PoseMove
 
 void MissionService::State::publish(Flight& flight, const flight::RangeDecided& event) {
   const auto& result = event.result;
-  if (auto* pilot = observer.load()) pilot->on_range(flight.id, result);
   deps.hub.collect(Topic::ranges, live_range_json(flight.id, result), result.range.time.us(),
                    result.range.anchor);
 }

@@ -14,14 +14,14 @@ constexpr int k_joint_rest = 24;
 
 }  // namespace
 
-std::string MissionService::State::outline_of(const Mission& mission) const {
+GeoRings MissionService::State::outline_of(const Mission& mission) const {
   if (!deps.site_outline || !mission.site || mission.frame != TrackFrame::wgs84) return {};
   const auto site = deps.sites.site(*mission.site);
-  return site ? site.value().outline_geojson : std::string();
+  return site ? site.value().outline : GeoRings{};
 }
 
 flight::LiveMission::JointProblem MissionService::State::joint_problem(flight::LiveMission& live,
-                                                                       const std::string& outline) {
+                                                                       const GeoRings& outline) {
   const auto origin = live.origin();
   return live.joint_problem(origin && !outline.empty() ? outline_in_enu(outline, *origin)
                                                        : std::vector<Eigen::Vector2d>{});
@@ -29,7 +29,7 @@ flight::LiveMission::JointProblem MissionService::State::joint_problem(flight::L
 
 void MissionService::State::start_joint(const std::shared_ptr<Flight>& flight) {
   if (stopped || flight->rebuilding || joint_busy) return;
-  const std::string outline = outline_of(mission_of(*flight));
+  const GeoRings outline = outline_of(mission_of(*flight));
   std::shared_ptr<flight::LiveMission::JointProblem> problem;
   if (auto work = flight->work.try_lock()) {
     if (work->joint_running || !work->live.joint_is_worth_it()) return;
@@ -77,7 +77,7 @@ void MissionService::set_priors(const MissionId& id, procedure::FlightPriors pri
   if (!flight) return;
   {
     auto inbox = flight->inbox.lock();
-    inbox->new_priors = std::move(priors);
+    inbox->given.priors = std::move(priors);
   }
   state_->schedule(flight);
 }
@@ -87,22 +87,19 @@ void MissionService::set_targets(const MissionId& id, PlanTargets targets) {
   if (!flight) return;
   {
     auto inbox = flight->inbox.lock();
-    inbox->new_targets = std::move(targets);
+    inbox->given.targets = std::move(targets);
   }
   state_->schedule(flight);
 }
 
 /// What its flight found, and what is wanted of it, since the last rows.
 void MissionService::State::take_given(Flight& flight, Flight::Work& work) {
-  std::optional<procedure::FlightPriors> priors;
-  std::optional<PlanTargets> targets;
+  flight::ForMission given;
   {
     auto inbox = flight.inbox.lock();
-    priors = std::exchange(inbox->new_priors, std::nullopt);
-    targets = std::exchange(inbox->new_targets, std::nullopt);
+    given = std::exchange(inbox->given, {});
   }
-  if (priors) work.live.use_priors(*std::move(priors));
-  if (targets) work.live.use_targets(*std::move(targets));
+  flight::give(work.live, std::move(given));
 }
 
 }  // namespace anchord::api

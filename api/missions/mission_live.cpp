@@ -45,7 +45,7 @@ void MissionService::State::report_position(Flight& flight, const Fix& fix) {
     auto positions = flight.positions.lock();
     events = positions->add(fix);
   }
-  for (const auto& event : events) std::visit([&](const auto& one) { publish(flight, one); }, event);
+  publish_events(flight, events);
 }
 
 void MissionService::State::share_origin(Flight& flight, const Flight::Work& work) {

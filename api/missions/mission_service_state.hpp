@@ -13,6 +13,7 @@
 #include "api/missions/stored_rows.hpp"
 #include "api/wire/live_writer.hpp"
 #include "core/base/locked.hpp"
+#include "core/flight/hand_over.hpp"
 #include "core/flight/live_mission.hpp"
 #include "core/flight/position_watch.hpp"
 #include "core/ports/anchor_store.hpp"
@@ -21,6 +22,7 @@
 #include "core/ports/measurement_store.hpp"
 #include "core/ports/mission_store.hpp"
 #include "core/ports/site_store.hpp"
+#include "core/types/geo_rings.hpp"
 
 namespace anchord::api {
 
@@ -43,9 +45,8 @@ struct MissionService::Flight {
     Mission mission;
     std::deque<flight::LiveRow> queue;
     flight::RowsAhead ahead{k_max_queued_rows};
-    std::optional<procedure::FlightPriors> new_priors;
-    std::optional<PlanTargets> new_targets;
-    bool view_wanted{false};  ///< by one who does not wait: made as soon as the strand is at rest
+    flight::ForMission given;  ///< of its flight, since the last rows
+    bool view_wanted{false};   ///< by one who does not wait: made as soon as the strand is at rest
     std::optional<LiveView> view;
     SteadyTime view_made{};
     bool scheduled{false};
@@ -57,7 +58,7 @@ struct MissionService::Flight {
     bool gone{false};
     std::optional<SteadyTime> fix_arrival{}, range_arrival{};
     /// Something is still to be done, rows that are read back apart.
-    bool busy() const { return scheduled || closing || new_priors || new_targets || !queue.empty(); }
+    bool busy() const { return scheduled || closing || given.any() || !queue.empty(); }
   };
   Locked<Inbox> inbox;
   Locked<flight::PositionWatch> positions;  ///< held for one fix; no other lock is taken under it
@@ -157,7 +158,8 @@ struct MissionService::State : std::enable_shared_from_this<MissionService::Stat
   void note_radios(const flight::LiveRow& row, SteadyTime now);
   /// What the live mission reports, to the world: hub, event log, store, pilot.
   void publish_events(Flight& flight, Flight::Work& work);
-  void publish(const Flight& flight, const flight::FixBelieved& event) const;
+  void publish_events(const Flight& flight, const std::vector<flight::PositionEvent>& events) const;
+  static void publish(const Flight&, const flight::FixBelieved&) {}  // for the pilot alone
   void publish(const Flight& flight, const flight::FixShown& event) const;
   void publish(const Flight& flight, const flight::PoseMoved& event) const;
   void publish(Flight& flight, const flight::RangeDecided& event);
@@ -178,9 +180,8 @@ struct MissionService::State : std::enable_shared_from_this<MissionService::Stat
   void forget_reads(const std::optional<MissionId>& id);
   std::shared_ptr<const std::string> replayed(const Mission& mission);
   std::optional<double> length_of(const MissionId& id) const;
-  static flight::LiveMission::JointProblem joint_problem(flight::LiveMission& live,
-                                                         const std::string& outline);
-  std::string outline_of(const Mission& mission) const;
+  static flight::LiveMission::JointProblem joint_problem(flight::LiveMission& live, const GeoRings& outline);
+  GeoRings outline_of(const Mission& mission) const;
   /// Counted, so that stop() can wait for it.
   void post(Executor& on, std::function<void()> task);
   flight::LiveMissionSetup setup_of(const Mission& mission) const;

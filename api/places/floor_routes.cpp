@@ -84,7 +84,12 @@ void give_to_site(PlaceApi& s, const Request& request, const Floor& floor, const
                   {{"/site_outline", "bad_value", "needs an outline"}});
   const auto building = value_or_problem(s.places.building(floor.building));
   Site site = value_or_problem(s.sites.site(building.site));
-  site.outline_geojson = outline.text;
+  std::string wrong;
+  const auto rings = rings_of(kept_json(outline.text), wrong);
+  if (!rings)
+    throw_problem(422, "validation", "the outline cannot be the site's",
+                  {{"/outline" + wrong, "out_of_range", "a corner is [lon, lat] in degrees"}});
+  site.outline = *rings;
   value_or_problem(s.sites.update(site, site.version));
   s.audit(request, "site.change " + to_string(site.id) + " outline of floor " + to_string(floor.id));
 }

@@ -8,6 +8,7 @@
 #include "core/base/time.hpp"
 #include "core/types/document.hpp"
 #include "core/types/estimate.hpp"
+#include "core/types/geo_rings.hpp"
 
 namespace anchord {
 
@@ -16,7 +17,7 @@ struct Site {
   SiteId id{};
   std::string name;
   std::optional<Wgs84> origin{};  ///< of the ENU frame; absent: the first fixed position of its first mission
-  std::string outline_geojson;    ///< polygon, or empty
+  GeoRings outline;               ///< of the building; empty: none
   std::string crs_frame;          ///< datum of the base, e.g. "ETRS89"; empty = unknown
   std::optional<double> crs_epoch{};
   std::optional<double> base_sigma_m{};  ///< of the base station's own coordinates

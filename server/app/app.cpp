@@ -11,6 +11,7 @@
 #include "api/application.hpp"
 #include "api/mqtt/topic_name.hpp"
 #include "api/stream/hub.hpp"
+#include "core/base/text.hpp"
 #include "drivers/drone/signing_key.hpp"
 #include "drivers/link/address.hpp"
 #include "server/app/authenticator.hpp"
@@ -218,6 +219,7 @@ Result<void> App::State::open_devices() {
   DeviceManagerOptions options;
   options.data_dir = data_dir;
   options.from_config = config.list("devices");
+  options.max_waiting_rows = config.count("storage.device_queue");
   options.log = [](const std::string& text) { log(LogLevel::info, "device", {{"what", text}}); };
   BOOST_OUTCOME_TRY(devices, DeviceManager::open(std::move(options)));
   return boost::outcome_v2::success();
@@ -311,8 +313,11 @@ std::vector<api::AlarmCondition> App::State::alarms() const {
   std::vector<api::AlarmCondition> out;
   if (const auto lost = devices->rows_lost(); lost > 0)
     out.push_back({"rows.lost", api::AlarmPriority::critical,
-                   std::to_string(lost) + " rows of devices were not stored since the start; they are in the "
-                                          "recording: anchord replay gives them to the server",
+                   std::to_string(lost) +
+                       " rows of devices were not stored since the start; they are in the "
+                       "recordings of " +
+                       to_utf8((data_dir / "recordings").string()) +
+                       ": anchord replay RECORDING --url URL gives them to the server, once each",
                    std::nullopt});
   if (!tls) return out;
   for (auto& warning : tls_warnings(tls->facts(), tls->failure(), clock.now()))

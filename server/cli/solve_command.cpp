@@ -324,9 +324,11 @@ void add_solve_command(CLI::App& app, int& exit_code) {
   auto* command = app.add_subcommand("solve", "Find the anchors of recorded flights, without a server");
   auto arguments = std::make_shared<Arguments>();
   add_options(*command, *arguments);
-  command->add_option("--clues", arguments->priors,
-                      "JSON: outline, bearings, heights, RSS: priors that separate an anchor from its mirror "
-                      "(docs/formats.md)");
+  auto* priors = command->add_option(
+      "--priors", arguments->priors,
+      "JSON: outline, bearings, heights, RSS: priors that separate an anchor from its mirror "
+      "(docs/formats.md)");
+  command->add_option("--clues", arguments->priors, "Deprecated name of --priors")->excludes(priors);
   auto* models =
       command->add_option("--models", arguments->models,
                           "Model artifacts (anchord train) that correct and weigh the ranges, one a task");

@@ -47,6 +47,10 @@ constexpr std::array k_options = {
            "a request that takes longer is a warning in the log, unless it asked to wait; 0: none is", count},
     Option{"storage.synchronous", "full", "what a commit waits for; full survives a power cut", choice,
            "normal|full|extra"},
+    Option{"storage.device_queue", "100000",
+           "rows of devices that may wait in memory for the database; beyond: the oldest leave, alarm "
+           "rows.lost",
+           count},
     Option{"backup.schedule", "on",
            "a copy of the database every backup.every_h hours and after every flight", choice, "on|off"},
     Option{"backup.every_h", "24", "hours between two scheduled backups", count},

@@ -21,32 +21,32 @@ InlineFlight::InlineFlight(Setup setup, Drone& drone)
       live_(live_setup(setup_)),
       operations_(&drone) {}
 
-void InlineFlight::publish_events(const Now& now) {
+void InlineFlight::publish_events() {
   for (const auto& event : live_.take_events()) {
     on_event(event);
-    std::visit([&](const auto& e) { take(now, e); }, event);
+    report(*this, setup_.mission.id, event);
   }
 }
 
 void InlineFlight::step(const Now& now, std::span<const Fix> fixes, std::span<const Range> ranges) {
+  now_ = now;
   for (const auto& range : ranges) live_.add(LiveRow(PredictedRange{range, {}, range.time}));
   for (const auto& fix : fixes) {
     for (const auto& event : positions_.add(fix)) {
       on_position(event);
-      std::visit([&](const auto& e) { take(now, e); }, event);
+      report(*this, event);
     }
     live_.add(LiveRow(fix));
   }
   live_.settle();
-  publish_events(now);
-  const auto& f = flight();
-  const bool deciding = f && f->control.engine().state().step == procedure::Step::find_next_point;
+  publish_events();
+  const bool deciding = wants_estimates(operations_).has_value();
   std::optional<Operations::Estimates> estimates;
   if (deciding && live_.origin()) estimates = {*live_.origin(), live_.estimates()};
   operations_.round(now, estimates, deciding);
-  if (!setup_.use_priors || !f || priors_ == f->control.engine().priors_version()) return;
-  priors_ = f->control.engine().priors_version();
-  live_.use_priors(f->priors());
+  auto given = hand_over_.take(operations_);
+  if (!setup_.use_priors) given.priors.reset();
+  give(live_, std::move(given));
 }
 
 Result<void> InlineFlight::start(const Now& now) {

@@ -6,15 +6,16 @@
 #include <string>
 #include <vector>
 
+#include "core/flight/hand_over.hpp"
 #include "core/flight/live_mission.hpp"
 #include "core/flight/operations.hpp"
 #include "core/flight/position_watch.hpp"
 
 namespace anchord::flight {
 
-/// One live mission and whoever flies by it, joined as the server joins them, but driven by calls: simulated
-/// missions and recordings are flown by what flies real ones, without its threads.
-class InlineFlight {
+/// One live mission and whoever flies by it, joined as the server joins them (core/flight/hand_over), but
+/// driven by calls: simulated missions and recordings are flown by what flies real ones, without its threads.
+class InlineFlight : private Pilot {
  public:
   struct Setup {
     Mission mission;
@@ -41,19 +42,18 @@ class InlineFlight {
   std::function<void(const PositionEvent&)> on_position = [](const PositionEvent&) {};
 
  private:
-  void publish_events(const Now& now);
-  void take(const Now& now, const FixBelieved& event) { operations_.fix(now, event.fix); }
-  void take(const Now& now, const RangeDecided& event) {
-    operations_.range(now, setup_.mission.id, event.result);
+  void publish_events();
+  void on_fix(const Fix& fix) override { operations_.fix(now_, fix); }
+  void on_range(const MissionId& mission, const RangeResult& result) override {
+    operations_.range(now_, mission, result);
   }
-  template <class Other>
-  void take(const Now&, const Other&) {}
 
   Setup setup_;
+  Now now_;  ///< of the present step
   PositionWatch positions_;
   LiveMission live_;
   Operations operations_;
-  std::uint64_t priors_{0};
+  HandOver hand_over_;
 };
 
 }  // namespace anchord::flight

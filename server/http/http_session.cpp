@@ -296,9 +296,7 @@ class HttpSession final : public Connection, public std::enable_shared_from_this
   }
 
   api::Response overloaded() {
-    auto response = context_->gateway.problem(503, "overloaded", "too many requests wait");
-    response.header("Retry-After", "1");
-    return response;
+    return context_->gateway.problem(503, "overloaded", "too many requests wait");
   }
 
   awaitable<void> run_handler(Admission& admission, api::Response& response) {
@@ -316,7 +314,6 @@ class HttpSession final : public Connection, public std::enable_shared_from_this
             429, "rate-limited",
             "this token has " + std::to_string(context_->heavy_shares.per_name()) +
                 " computations or large answers under way; wait for one of them to end");
-        response.header("Retry-After", "1");
         co_return;
       }
     }

@@ -68,7 +68,10 @@ DeviceReport report_of(const DeviceConfig& config, const device::DeviceState& s)
 class DeviceManager::Impl final : public device::DeviceListener {
  public:
   explicit Impl(DeviceManagerOptions options)
-      : options_(std::move(options)), secrets_(options_.data_dir), work_(io_.get_executor()) {
+      : options_(std::move(options)),
+        secrets_(options_.data_dir),
+        work_(io_.get_executor()),
+        unstored_(options_.max_waiting_rows, k_store_batch) {
     device::LoopOptions loop;
     loop.seed = std::random_device{}();
     loop_ = std::make_unique<device::DeviceLoop>(io_, nullptr, *this, loop);
@@ -309,7 +312,7 @@ class DeviceManager::Impl final : public device::DeviceListener {
   DeviceBatch arrived_;                      ///< of the io thread
   boost::asio::steady_timer hand_on_{io_};
   Thread io_thread_, writer_;
-  RowQueue unstored_{k_max_waiting_rows, k_store_batch};
+  RowQueue unstored_;
   DeviceRows* rows_{nullptr};
 
   struct Kept {

@@ -11,8 +11,9 @@
 namespace anchord::server {
 
 struct DeviceManagerOptions {
-  std::filesystem::path data_dir;        ///< devices.json and recordings/ are in it
-  std::vector<std::string> from_config;  ///< "kind=address"; added when no device has the address
+  std::filesystem::path data_dir;         ///< devices.json and recordings/ are in it
+  std::vector<std::string> from_config;   ///< "kind=address"; added when no device has the address
+  std::size_t max_waiting_rows{100'000};  ///< for the database
   std::function<void(const std::string& text)> log{};
 };
 
@@ -20,11 +21,10 @@ struct DeviceManagerOptions {
 /// own, raw recordings; rows go to the live flight by a second thread (each 20 ms or 200 rows) and to the
 /// database by a third (each 100 ms), so that no flight waits for a disk.
 ///
-/// At most 100 000 rows wait for the database; then the oldest leave, counted (the recording has the bytes).
+/// At most max_waiting_rows wait for the database; then the oldest leave, counted (the recording has the
+/// bytes).
 class DeviceManager final : public DeviceControl {
  public:
-  static constexpr std::size_t k_max_waiting_rows = 100'000;
-
   /// errors: invalid_argument (from_config)
   static Result<std::unique_ptr<DeviceManager>> open(DeviceManagerOptions options);
   ~DeviceManager() override;

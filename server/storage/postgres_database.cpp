@@ -11,6 +11,7 @@
 #include "server/storage/postgres_gate.hpp"
 #include "server/storage/postgres_migrate.hpp"
 #include "server/storage/postgres_text.hpp"
+#include "server/storage/stalled.hpp"
 #include "server/storage/stores.hpp"
 
 namespace anchord {
@@ -64,6 +65,8 @@ class PostgresDatabase final : public Database {
       health.level =
           status.trouble->failure() == sql::Failure::full ? StorageLevel::full : StorageLevel::unavailable;
       health.reason = status.trouble->what();
+    } else {
+      sql::note_stall(status.oldest_s, "its server, that server's disk or the network hangs", health);
     }
     return health;
   }
@@ -78,7 +81,8 @@ class PostgresDatabase final : public Database {
     bool stopping{false};
   };
 
-  /// A database that fell away is tried also when nobody writes, so that readiness comes back by itself.
+  /// A database that fell away is tried also when nobody writes, so that readiness comes back by itself; and
+  /// one that answers no more is noticed.
   void watch() {
     for (;;) {
       (void)guarded("database watch", [this] { look(); });

@@ -125,21 +125,24 @@ PostgresGate::PostgresGate(PostgresPool::Open open, Limits limits)
       writers_(open, limits.writers, outage_),
       readers_(std::move(open), limits.readers, outage_) {}
 
-std::optional<Error> PostgresGate::enter(std::size_t rows) {
-  auto status = status_.lock();
-  const bool too_many_rows = status->queued_rows > 0 && status->queued_rows + rows > limits_.max_rows;
-  if (too_many_rows || status->queued_calls >= limits_.max_calls) {
+std::optional<Error> PostgresGate::enter(std::size_t rows, Since::const_iterator& entry) {
+  auto shared = shared_.lock();
+  auto& status = shared->status;
+  const bool too_many_rows = status.queued_rows > 0 && status.queued_rows + rows > limits_.max_rows;
+  if (too_many_rows || status.queued_calls >= limits_.max_calls) {
     return make_error(Errc::queue_full,
-                      "too much waits to be written: " + std::to_string(status->queued_rows) + " rows in " +
-                          std::to_string(status->queued_calls) + " calls");
+                      "too much waits to be written: " + std::to_string(status.queued_rows) + " rows in " +
+                          std::to_string(status.queued_calls) + " calls");
   }
-  status->queued_rows += rows;
-  ++status->queued_calls;
+  status.queued_rows += rows;
+  ++status.queued_calls;
+  entry = shared->waiting.insert(SteadyClock::now());
   return std::nullopt;
 }
 
 std::optional<Error> PostgresGate::write(std::size_t rows, const Work& work) {
-  if (auto full = enter(rows)) return full;
+  Since::const_iterator entry;
+  if (auto full = enter(rows, entry)) return full;
   std::optional<Error> error;
   try {
     error = attempt(rows, work);
@@ -149,9 +152,10 @@ std::optional<Error> PostgresGate::write(std::size_t rows, const Work& work) {
   } catch (const std::exception& failed) {
     error = make_error(Errc::internal, std::string("storage: ") + failed.what());
   }
-  auto status = status_.lock();
-  status->queued_rows -= rows;
-  --status->queued_calls;
+  auto shared = shared_.lock();
+  shared->status.queued_rows -= rows;
+  --shared->status.queued_calls;
+  shared->waiting.erase(entry);
   return error;
 }
 
@@ -173,13 +177,14 @@ std::optional<Error> PostgresGate::attempt(std::size_t rows, const Work& work) {
       pause_before(n);
       continue;
     }
-    auto status = status_.lock();
+    auto shared = shared_.lock();
+    auto& status = shared->status;
     // Whether there is space again, only rows tell.
-    if (rows > 0 || (status->trouble && status->trouble->failure() != Failure::full)) status->trouble.reset();
+    if (rows > 0 || (status.trouble && status.trouble->failure() != Failure::full)) status.trouble.reset();
     if (error || rows == 0) return error;
-    ++status->commits;
-    status->rows += rows;
-    status->last_commit_s = std::chrono::duration<double>(SteadyClock::now() - start).count();
+    ++status.commits;
+    status.rows += rows;
+    status.last_commit_s = std::chrono::duration<double>(SteadyClock::now() - start).count();
     return std::nullopt;
   }
 }
@@ -200,16 +205,22 @@ std::optional<Error> PostgresGate::read(const Work& work) {
   }
 }
 
-PostgresGate::Status PostgresGate::status() const { return status_.copy(); }
+PostgresGate::Status PostgresGate::status() const {
+  const auto shared = shared_.lock();
+  Status status = shared->status;
+  if (!shared->waiting.empty())
+    status.oldest_s = std::chrono::duration<double>(SteadyClock::now() - *shared->waiting.begin()).count();
+  return status;
+}
 
 void PostgresGate::note(const SqlError& trouble) {
-  auto status = status_.lock();
-  status->trouble = trouble;
+  auto shared = shared_.lock();
+  shared->status.trouble = trouble;
 }
 
 void PostgresGate::count_repeat() {
-  auto status = status_.lock();
-  ++status->repeats;
+  auto shared = shared_.lock();
+  ++shared->status.repeats;
 }
 
 }  // namespace anchord::sql

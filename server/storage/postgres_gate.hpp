@@ -5,6 +5,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -60,6 +61,7 @@ class PostgresGate final : public Gate {
     std::size_t queued_calls{}, queued_rows{};
     std::uint64_t commits{}, rows{}, repeats{};
     double last_commit_s{};
+    double oldest_s{};                ///< how long the write that waits longest has waited; 0: none waits
     std::optional<SqlError> trouble;  ///< of the last call that did not reach the database or found no space
   };
   PostgresGate(PostgresPool::Open open, Limits limits);
@@ -70,7 +72,12 @@ class PostgresGate final : public Gate {
   Status status() const;
 
  private:
-  std::optional<Error> enter(std::size_t rows);
+  using Since = std::multiset<std::chrono::steady_clock::time_point>;
+  struct Shared {
+    Status status;
+    Since waiting;  ///< since when each write that is under way is
+  };
+  std::optional<Error> enter(std::size_t rows, Since::const_iterator& entry);
   std::optional<Error> attempt(std::size_t rows, const Work& work);
   void note(const SqlError& trouble);
   void count_repeat();
@@ -79,7 +86,7 @@ class PostgresGate final : public Gate {
   const std::string begin_write_, begin_read_;
   Locked<PostgresPool::Outage> outage_;
   PostgresPool writers_, readers_;
-  Locked<Status> status_;
+  Locked<Shared> shared_;
 };
 
 }  // namespace anchord::sql

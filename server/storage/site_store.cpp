@@ -1,4 +1,5 @@
 #include "server/storage/measurement_rows.hpp"
+#include "server/storage/outline_text.hpp"
 #include "server/storage/stores.hpp"
 
 namespace anchord::sql {
@@ -28,7 +29,7 @@ constexpr const char* k_site_remove = "DELETE FROM site WHERE id = ?1 AND versio
 void bind(Query& query, const Site& s, std::uint64_t version) {
   query << s.id << s.name;
   bind_wgs84(query, s.origin);
-  query << s.outline_geojson << s.crs_frame << s.crs_epoch << s.base_sigma_m << s.base_source;
+  query << outline_text(s.outline) << s.crs_frame << s.crs_epoch << s.base_sigma_m << s.base_source;
   if (s.projected_epsg)
     query << *s.projected_epsg;
   else
@@ -41,7 +42,7 @@ Site read_site(Query& query) {
   s.id = query.id<SiteId>();
   s.name = query.text();
   s.origin = read_wgs84(query);
-  s.outline_geojson = query.text();
+  s.outline = outline_in(query.text());
   s.crs_frame = query.text();
   s.crs_epoch = query.maybe_real();
   s.base_sigma_m = query.maybe_real();

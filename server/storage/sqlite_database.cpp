@@ -12,6 +12,7 @@
 #include "server/storage/reader_pool.hpp"
 #include "server/storage/sqlite_connection.hpp"
 #include "server/storage/sqlite_file.hpp"
+#include "server/storage/stalled.hpp"
 #include "server/storage/stores.hpp"
 #include "server/storage/write_queue.hpp"
 
@@ -26,8 +27,6 @@ using Mode = SqliteConnection::Mode;
 
 // Beyond this size a check at start takes longer than a start may; it then runs beside the first requests.
 constexpr std::uint64_t k_check_at_start_bytes = 256u << 20;
-// A commit takes milliseconds; below this a busy disk would be an alarm.
-constexpr double k_stalled_s = 3;
 
 std::uint64_t size_of(const std::filesystem::path& file) {
   std::error_code error;
@@ -112,11 +111,9 @@ class SqliteDatabase final : public Database, private sql::Gate {
     } else if (damage_found_) {
       health.level = StorageLevel::unavailable;
       health.reason = "the check of the database found damage; see the log of the start";
-    } else if (status.oldest_s > k_stalled_s) {
-      health.level = StorageLevel::stalled;
-      health.reason = "the database has not taken a write for " +
-                      std::to_string(static_cast<int>(status.oldest_s)) +
-                      " s: the disk hangs, or another program holds the database";
+    } else if (sql::note_stall(status.oldest_s, "the disk hangs, or another program holds the database",
+                               health)) {
+      return;
     } else if (free < options_.refuse_free_bytes) {
       health.level = StorageLevel::disk_scarce;
       health.reason = mebibytes(free) + " free on the disk: no new missions";

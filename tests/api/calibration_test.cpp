@@ -1,5 +1,6 @@
 // What a calibration may be asked for, each shown to have an effect: the likelihood of a model, stated noise,
 // starts, a local frame, ranges between anchors, the site's outline.
+#include "api/calibration/calibration_service.hpp"
 #include "app_fixture.hpp"
 #include "core/geo/enu.hpp"
 #include "core/ports/measurement_store.hpp"
@@ -235,14 +236,14 @@ TEST_F(Calibrations, BeginWhereBearingAndHeightMeet) {
             {"sigma_deg", 180}}},
           {"height", {{"up_m", turn.z() + way.z()}, {"sigma_m", 100}}}};
     }
-    return solved(mission, {{"initial", initial}, {"clues", {{"anchors", anchors}}}})["anchors"];
+    return solved(mission, {{"initial", initial}, {"priors", {{"anchors", anchors}}}})["anchors"];
   };
   const auto low = begun(2, "bearing_height"), high = begun(10, "bearing_height");
   const auto searched = begun(2, "search"), searched_high = begun(10, "search");
   for (std::size_t i = 0; i < low.size(); ++i) {
     const auto up_m = [&](const Json& anchors) { return anchors[i]["enu_m"][2].get<double>(); };
     EXPECT_GT(up_m(high) - up_m(low), 2.0) << i;
-    EXPECT_NEAR(up_m(searched), up_m(searched_high), 1.0) << "the clues alone decide nothing";
+    EXPECT_NEAR(up_m(searched), up_m(searched_high), 1.0) << "the priors alone decide nothing";
   }
 }
 
@@ -456,9 +457,11 @@ TEST_F(Calibrations, TakeTheOutlineOfTheSiteAsAPriorUnlessToldNotTo) {
   }
   const auto mission = flown(facade, 0, site(outline));
   const auto without = solved(mission, {{"site_outline", false}});
-  EXPECT_EQ(without["provenance"]["clues"]["outline"]["source"], "none");
+  EXPECT_EQ(without["provenance"]["priors"]["outline"]["source"], "none");
   const auto with = solved(mission);
-  const auto& told = with["provenance"]["clues"]["outline"];
+  const auto& told = with["provenance"]["priors"]["outline"];
+  EXPECT_EQ(with["provenance"]["clues"]["outline"], told) << "under its name up to 0.1 as well";
+  EXPECT_EQ(with["provenance"]["n_clues"], with["provenance"]["n_priors"]);
   EXPECT_EQ(told["source"], "site");
   EXPECT_EQ(told["sigma_m"], 1.0);
   for (std::size_t i = 0; i < facade.anchors.size(); ++i) {
@@ -466,6 +469,33 @@ TEST_F(Calibrations, TakeTheOutlineOfTheSiteAsAPriorUnlessToldNotTo) {
     EXPECT_EQ(with["anchors"][i]["verdict"], "ok") << with["anchors"][i]["reason"];
   }
   EXPECT_LT(error_m(with, facade), 0.3);
+}
+
+TEST(CalibrationRequest, TakesPriorsUnderTheNameTheyHadUpTo01ButNotUnderBoth) {
+  const Json square = {{"outline_m", {{-5, -5}, {5, -5}, {5, 5}, {-5, 5}}}};
+  const auto read = [](const Json& more, std::vector<api::FieldError>& errors) {
+    Json body{{"missions", {"0197e6a0-0000-7000-8000-000000000001"}}};
+    body.update(more);
+    return api::read_calibration_request(body, errors);
+  };
+  for (const std::string name : {"priors", "clues"}) {
+    std::vector<api::FieldError> errors;
+    EXPECT_EQ(read({{name, square}}, errors).options.outline_m.size(), 4u) << name;
+    EXPECT_TRUE(read({{"flight_" + name, true}}, errors).flight_priors) << name;
+    EXPECT_FALSE(read({{"flight_" + name, false}}, errors).flight_priors) << name;
+    (void)read({{name, nullptr}, {"flight_" + name, nullptr}}, errors);
+    EXPECT_TRUE(errors.empty()) << name << ": " << errors.front().pointer << " " << errors.front().detail;
+    (void)read({{name, {{"outline", 1}}}}, errors);
+    ASSERT_EQ(errors.size(), 1u) << name;
+    EXPECT_EQ(errors[0].pointer, "/" + name + "/outline") << "as it was sent";
+  }
+  std::vector<api::FieldError> errors;
+  (void)read({{"priors", square}, {"clues", square}, {"flight_priors", true}, {"flight_clues", true}},
+             errors);
+  ASSERT_EQ(errors.size(), 2u);
+  EXPECT_EQ(errors[0].pointer, "/clues");
+  EXPECT_EQ(errors[0].detail, "is the former name of priors: send one of them");
+  EXPECT_EQ(errors[1].pointer, "/flight_clues");
 }
 
 TEST_F(Calibrations, HoldBackAnAnchorFarOutsideOfTheOutline) {
@@ -476,7 +506,7 @@ TEST_F(Calibrations, HoldBackAnAnchorFarOutsideOfTheOutline) {
   for (const auto& gate : answer["anchors"][0]["quality"]["gates"])
     if (!gate["passed"].get<bool>()) failed += gate["name"].get<std::string>() + " ";
   EXPECT_EQ(failed, "outline ");
-  EXPECT_LT(error_m(answer, m), 0.3) << "a clue of a metre moves no good answer";
+  EXPECT_LT(error_m(answer, m), 0.3) << "a prior of a metre moves no good answer";
 }
 
 class DatumChanges : public Calibrations {

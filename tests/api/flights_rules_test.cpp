@@ -1,9 +1,46 @@
 // What is shown of a flight over REST, and where one may begin.
+#include <chrono>
+#include <future>
+
+#include "api/flight/kept_outcome.hpp"
 #include "core/flight/flown_time.hpp"
 #include "flights_fixture.hpp"
 
 namespace anchord::test {
 namespace {
+
+/// While a message is sent, another thread asks for what is guarded by the lock that safety is checked under.
+class AsksWhileSending final : public api::HubListener {
+ public:
+  explicit AsksWhileSending(std::function<void()> ask) : ask_(std::move(ask)) {}
+  void on_message(api::Topic topic, const std::shared_ptr<const api::LiveMessage>&) override {
+    ++sent[topic];
+    if (waited.contains(topic)) return;
+    asked_.push_back(std::async(std::launch::async, ask_));
+    if (asked_.back().wait_for(std::chrono::seconds(2)) != std::future_status::ready) ++waited[topic];
+  }
+  void on_tick(UtcTime, bool) override {}
+  void on_bye(std::uint16_t, std::string_view) override {}
+  std::map<api::Topic, int> sent, waited;
+
+ private:
+  std::function<void()> ask_;
+  std::vector<std::future<void>> asked_;  ///< joined with the listener, when nothing is held any more
+};
+
+TEST_F(Flights, TheLockOfTheSafetyChecksIsFreeWhileMessagesAndEventsAreSent) {
+  mission_ = mission();
+  AsksWhileSending listener([this] { (void)get(base() + "/procedure"); });
+  auto membership = app_->hub().join(listener);
+  for (const auto topic : {api::Topic::procedure, api::Topic::events, api::Topic::mission_turn})
+    membership.subscribe(topic, std::nullopt);
+  take_off(mission_);
+  fly(5);
+  membership = {};
+  EXPECT_GE(listener.sent[api::Topic::procedure], 5) << "once a second";
+  EXPECT_GE(listener.sent[api::Topic::events], 2) << "control taken, procedure begun";
+  EXPECT_EQ(listener.waited, (std::map<api::Topic, int>{}));
+}
 
 TEST_F(Flights, TheChecklistHasThePreArmStateInTheAutopilotsWordsAndCallsAFloatAFloat) {
   mission_ = mission();
@@ -87,6 +124,19 @@ TEST_F(Flights, StartingAgainInTheAirNeedsAHomeOnTheGround) {
 }
 
 /// Both are of the flight as it was started: what comes of it later is compared with what was promised.
+TEST_F(Flights, PriorsThatWereKeptUnderTheirNameUpTo01AreRead) {
+  const MissionId id{parse_uuid(mission()).value()};
+  const std::string priors =
+      R"({"0x6a21":{"bearing":{"from":[51.0231,3.7131,60],"rad":1.2,"sigma_rad":0.4}}})";
+  auto& plans = database_->stores().plans;
+  for (const std::string name : {"clues", "priors"}) {
+    ASSERT_TRUE(plans.keep_procedure(id, R"({"landed":true,")" + name + "\":" + priors + "}", UtcTime{}));
+    const auto kept = api::kept_outcome(plans, id).priors;
+    ASSERT_EQ(kept.size(), 1u) << name;
+    EXPECT_EQ(kept.begin()->second.bearing->bearing_rad, 1.2) << name;
+  }
+}
+
 TEST_F(Flights, TheFlownTimeIsKeptBesideItsForecast) {
   mission_ = mission();
   const auto plan = make_plan();

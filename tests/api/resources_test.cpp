@@ -47,6 +47,33 @@ TEST_F(Resources, FinishAMissionOnce) {
   EXPECT_EQ(json(get("/api/v1/missions/" + id + "/events"))["items"].size(), 2u);
 }
 
+TEST_F(Resources, KeepEveryDigitAndEveryRingOfAnOutlineAndSayWhatIsNoCornerOfOne) {
+  const auto with_outline = [](const Json& coordinates) {
+    return Json{{"name", "hall"}, {"outline", {{"type", "Polygon"}, {"coordinates", coordinates}}}}.dump();
+  };
+  const Json yard = Json::parse(
+      "[[[3.7100000000000004,51.02],[3.72,51.02],[3.72,51.030000000000001],[3.71,51.02]],"
+      "[[3.711,51.021],[3.712,51.021],[3.7121234567890123,51.0221]]]");
+  const auto made = post("/api/v1/sites", with_outline(yard));
+  ASSERT_EQ(made.status, 201) << made.body;
+  const std::string path = "/api/v1/sites/" + json(made)["id"].get<std::string>();
+  ASSERT_EQ(call(Method::patch, path, R"({"name":"yard"})", with("if-match", "*")).status, 200);
+  EXPECT_EQ(json(get(path))["outline"], (Json{{"type", "Polygon"}, {"coordinates", yard}}));
+  ASSERT_EQ(call(Method::patch, path, R"({"outline":null})", with("if-match", "*")).status, 200);
+  EXPECT_TRUE(json(get(path))["outline"].is_null());
+  const std::vector<std::pair<std::string, Json>> wrong{
+      {"/outline/coordinates", "round"},
+      {"/outline/coordinates/0", Json::parse("[7]")},
+      {"/outline/coordinates/0/1", Json::parse("[[[3.7,51],[3.7]]]")},
+      {"/outline/coordinates/1/0", Json::parse(R"([[[3.7,51]],[["3.7","51"]]])")},
+      {"/outline/coordinates/0/0", Json::parse("[[[51,370]]]")}};
+  for (const auto& [pointer, coordinates] : wrong) {
+    const auto refused = post("/api/v1/sites", with_outline(coordinates));
+    EXPECT_EQ(refused.status, 422) << coordinates;
+    EXPECT_EQ(json(refused)["errors"][0]["pointer"], pointer) << coordinates;
+  }
+}
+
 TEST_F(Resources, PageByCursorWithoutLosingOrRepeatingRows) {
   std::set<std::string> made, seen;
   for (int i = 0; i < 7; ++i) made.insert(mission());

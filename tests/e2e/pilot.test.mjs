@@ -275,7 +275,7 @@ test('start is blocked until the checklist is green; then the aircraft flies, ho
   const [{ id: made }] = (await get('/api/v1/calibrations')).items,
     { anchors, provenance } = await get(`/api/v1/calibrations/${made}`);
   for (const { network_id } of anchors) assert.ok(await report.getByText(network_id).count(), network_id);
-  assert.ok(provenance.n_clues > 0, 'what the turn and the height search told went into it');
+  assert.ok(provenance.n_priors > 0, 'what the turn and the height search told went into it');
   // One limit for "accurate enough": the target of the plan that was flown, in the calibration, the report and the review.
   for (const { network_id, goal, quality } of anchors) {
     assert.equal(goal.source, 'plan_target', network_id);

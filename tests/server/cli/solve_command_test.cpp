@@ -81,6 +81,20 @@ class SolveCommand : public ::testing::Test {
   }
 };
 
+TEST_F(SolveCommand, TakesPriorsUnderTheNameTheyHadUpTo01ButNotUnderBoth) {
+  const auto file = "'" + (folder_ / "priors.json").string() + "'";
+  std::ofstream(folder_ / "priors.json") << R"({"outline_m":[[-1,-1],[1,-1],[1,1],[-1,1]]})";
+  const auto with = [&](const std::string& names) {
+    return run("solve " + quoted() + " --format json" + names, "2>&1");
+  };
+  const auto priors = with(" --priors " + file), former = with(" --clues " + file);
+  EXPECT_EQ(priors.out, former.out);
+  EXPECT_NE(priors.out, with("").out) << "the anchors are far outside of that outline";
+  const auto both = with(" --priors " + file + " --clues " + file);
+  EXPECT_NE(both.exit_code, 0);
+  EXPECT_NE(both.out.find("--priors"), std::string::npos) << both.out;
+}
+
 TEST_F(SolveCommand, PrintsJsonAloneOnStandardOutput) {
   const Answer answer = run("solve " + quoted() + " --format json");
   ASSERT_EQ(answer.exit_code, 0);

@@ -165,6 +165,7 @@ class Home {
   }
   std::string written;
   std::set<std::string> steps;
+  std::vector<Estimate> estimates() { return flight_.live().estimates(); }
 
  private:
   void take(const flight::RangeDecided& e) {
@@ -234,6 +235,12 @@ TEST(FlightReplay, ARecordedFlightGivesTheSameEventsAndCommandsByteForByte) {
   }
   EXPECT_TRUE(flown.steps.contains("ranging")) << flown.written.substr(0, 3000);
   EXPECT_GT(std::ranges::count(aircraft.commands, '\n'), 20);
+  EXPECT_FALSE(flown.estimates().empty());
+  for (const auto& estimate : flown.estimates()) {
+    const auto target = std::ranges::find(estimate.gates, k_goal_sigma, &Gate::name);
+    ASSERT_NE(target, estimate.gates.end()) << to_string(estimate.anchor) << ": the flown plan has a target";
+    EXPECT_EQ(target->limit, plan.settings.target_sigma_m);
+  }
   for (int time = 0; time < 2; ++time) {
     ReplayedDrone replayed(aircraft.answers);
     Home home(mission, plan, replayed);

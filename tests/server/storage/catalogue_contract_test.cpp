@@ -259,7 +259,9 @@ TEST_P(AnchorStoreContract, ChangesASiteOnlyFromTheVersionNamed) {
   site.id = SiteId{make_uuid_v7(k_noon)};
   site.name = "Ghent";
   site.origin = Wgs84{51.02, 3.71, 58.4};
-  site.outline_geojson = "{}";
+  // Digits that no shorter text gives again, a hole, a ring that is not closed.
+  site.outline = {{{3.7100000000000004, 51.02}, {3.72, 51.02}, {3.72, 51.030000000000001}, {3.71, 51.02}},
+                  {{3.711, 51.021}, {3.712, 51.021}, {3.7121234567890123, 51.0221}}};
   site.crs_frame = "ETRS89";
   site.crs_epoch = 2026.34;
   site.base_sigma_m = 0.008;
@@ -274,6 +276,7 @@ TEST_P(AnchorStoreContract, ChangesASiteOnlyFromTheVersionNamed) {
   EXPECT_EQ(found.version, 2u);
   EXPECT_EQ(found.name, "West");
   EXPECT_EQ(found.origin->lat_deg, 51.02);
+  EXPECT_EQ(found.outline, site.outline);
   EXPECT_EQ(found.crs_epoch, 2026.34);
   EXPECT_EQ(found.base_sigma_m, 0.008);
   EXPECT_EQ(db_->stores().sites.sites(10, std::nullopt).value().size(), 1u);

@@ -10,6 +10,7 @@
 #include <chrono>
 #include <csignal>
 #include <filesystem>
+#include <fstream>
 #include <functional>
 #include <string>
 #include <thread>
@@ -65,6 +66,14 @@ class PostgresServer {
       wait_for(pid_);
     }
     pid_ = -1;
+  }
+
+  /// SIGSTOP, and later SIGCONT, to the server and every session: connections stay and nothing is answered.
+  void signal_all(int signal) const {
+    ::kill(pid_, signal);
+    const auto id = std::to_string(pid_);
+    std::ifstream children("/proc/" + id + "/task/" + id + "/children");
+    for (pid_t child = 0; children >> child;) ::kill(child, signal);
   }
 
   std::string address(const std::string& database) const {

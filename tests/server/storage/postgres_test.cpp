@@ -386,6 +386,45 @@ TEST(PostgresOutage, IsUnavailableWhileItLastsAndOverByItself) {
   EXPECT_EQ(db->stores().missions.mission(other.id).error().code, Errc::not_found);
 }
 
+/// A server that hangs breaks no connection: nothing but time tells of it, as with a disk (StorageFailure).
+TEST(PostgresOutage, IsStalledWhileTheServerAnswersNothingAndLosesNothing) {
+  if (!PostgresServer::installed()) GTEST_SKIP() << postgresql_missing();
+  PostgresServer server;
+  PostgresOptions options;
+  options.address = server.address("postgres");
+  const ScratchDir dir;
+  options.data_dir = dir.path();
+  const auto db = open_postgres(options).value();
+  const auto until = [&](StorageLevel level) {
+    const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(20);
+    while (db->health().level != level && std::chrono::steady_clock::now() < deadline)
+      std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    return db->health().level == level;
+  };
+  Mission mission;
+  mission.id = MissionId{make_uuid_v7(k_noon)};
+  mission.created = k_noon;
+  ASSERT_TRUE(db->stores().missions.insert(mission));
+  EXPECT_TRUE(until(StorageLevel::ok));
+
+  server.signal_all(SIGSTOP);
+  EXPECT_TRUE(until(StorageLevel::stalled)) << "although nobody writes";
+  EXPECT_THAT(db->health().reason, HasSubstr("has not taken a write for"));
+  Mission other = mission;
+  other.id = MissionId{make_uuid_v7(k_noon)};
+  std::atomic<bool> stored{false};
+  Thread writer("writer", [&] { stored = db->stores().missions.insert(other).has_value(); });
+  std::this_thread::sleep_for(std::chrono::milliseconds(200));
+  EXPECT_FALSE(stored) << "what is not in the database is not acknowledged";
+  EXPECT_TRUE(db->health().writable()) << "stalled, and nothing has failed";
+
+  server.signal_all(SIGCONT);
+  writer.join();
+  EXPECT_TRUE(stored);
+  EXPECT_TRUE(until(StorageLevel::ok)) << db->health().reason;
+  EXPECT_EQ(db->stores().missions.mission(other.id).value().id, other.id);
+}
+
 TEST(PostgresOutage, ARestartBetweenTwoCallsIsNotNoticed) {
   if (!PostgresServer::installed()) GTEST_SKIP() << postgresql_missing();
   PostgresServer server;

@@ -1,4 +1,4 @@
-/// What the stream tells of the flight itself: procedure, the planner's last decision, the clues of a turn or a height search. Same rules as messages.ts.
+/// What the stream tells of the flight itself: procedure, the planner's last decision, the priors of a turn or a height search. Same rules as messages.ts.
 import { num, obj, str, vec3, type Vec3 } from './messages';
 
 export const STEPS = [
