@@ -59,14 +59,31 @@ class Reader {
   std::optional<Error>& error_;
 };
 
+/// Coordinates of another system, in x_m, y_m, z_m.
+void read_source(Reader& r, FlightDeclaration& flight) {
+  flight.mission.frame = TrackFrame::local;
+  SourceCrsSpec spec;
+  spec.crs = r.text("crs", true);
+  spec.max_datum_error_m = r.number("max_datum_error_m", spec.max_datum_error_m);
+  if (const auto heights = r.text("heights", false); !heights.empty()) {
+    if (const auto read = read_heights(heights, spec); !read) r.fail(read.error().message);
+  }
+  flight.source = spec;
+}
+
 void read_track(Reader r, FlightDeclaration& flight, const std::string& file, std::optional<Error>& error) {
-  r.allow({"frame", "point", "in", "attitude", "heading_column", "heading_enu_ccw_from_east_deg"});
+  r.allow({"frame", "crs", "heights", "max_datum_error_m", "point", "in", "attitude", "heading_column",
+           "heading_enu_ccw_from_east_deg"});
   const std::string frame = r.text("frame", true);
   if (const auto known = k_frame_words.find(frame)) {
     flight.mission.frame = *known;
+  } else if (frame == "crs") {
+    read_source(r, flight);
   } else {
-    r.fail("'frame' is '" + frame + "', expected one of " + list_of(k_frame_words.words()));
+    r.fail("'frame' is '" + frame + "', expected one of " + list_of(k_frame_words.words()) + ", crs");
   }
+  if (!flight.source && (r.find("crs") || r.find("heights") || r.find("max_datum_error_m")))
+    r.fail("'crs', 'heights' and 'max_datum_error_m' are of the frame crs");
   const std::string point = r.text("point", true);
   if (const auto known = k_point_words.find(point)) {
     flight.mission.point = *known;

@@ -51,6 +51,9 @@ class SourceCrs {
   /// What PROJ says of the change of datum, one number for all; 0 where there is none.
   double datum_error_m() const { return datum_error_m_; }
 
+  /// X, Y, Z of the earth's centre, not a map.
+  bool geocentric() const { return geocentric_; }
+
   /// at      easting, northing, height; longitude, latitude (degrees), height; or X, Y, Z of ECEF: metres
   /// errors  invalid_argument (outside the system, or not finite)
   Result<Wgs84> wgs84(const Eigen::Vector3d& at) const;
