@@ -31,22 +31,23 @@ constexpr std::array k_targets{4937, 4979};
 constexpr double k_area_margin_deg = 1.5;
 constexpr double k_convergence_step_m = 10;
 
-struct Owned {
+}  // namespace
+
+/// Owns what PROJ made.
+struct ProjHandle {
   PJ* pj{nullptr};
-  explicit Owned(PJ* made = nullptr) : pj(made) {}
-  ~Owned() {
+  explicit ProjHandle(PJ* made = nullptr) : pj(made) {}
+  ~ProjHandle() {
     if (pj != nullptr) proj_destroy(pj);
   }
-  Owned(const Owned&) = delete;
-  Owned& operator=(const Owned&) = delete;
-  Owned(Owned&& other) noexcept : pj(std::exchange(other.pj, nullptr)) {}
-  Owned& operator=(Owned&& other) noexcept {
+  ProjHandle(const ProjHandle&) = delete;
+  ProjHandle& operator=(const ProjHandle&) = delete;
+  ProjHandle(ProjHandle&& other) noexcept : pj(std::exchange(other.pj, nullptr)) {}
+  ProjHandle& operator=(ProjHandle&& other) noexcept {
     std::swap(pj, other.pj);
     return *this;
   }
 };
-
-}  // namespace
 
 struct SourceCrs::Operations {
   Operations() : context(proj_context_create()) {
@@ -55,19 +56,19 @@ struct SourceCrs::Operations {
     proj_log_level(context, PJ_LOG_NONE);
   }
   ~Operations() {
-    horizontal = Owned();
-    vertical = Owned();
+    horizontal = ProjHandle();
+    vertical = ProjHandle();
     proj_context_destroy(context);
   }
   Operations(const Operations&) = delete;
   Operations& operator=(const Operations&) = delete;
   PJ_CONTEXT* context;
-  Owned horizontal, vertical;
+  ProjHandle horizontal, vertical;
 };
 
 namespace {
 
-std::string code(int epsg) { return "EPSG:" + std::to_string(epsg); }
+std::string epsg_text(int epsg) { return "EPSG:" + std::to_string(epsg); }
 
 std::string name_of(const PJ* pj) {
   const char* name = pj != nullptr ? proj_get_name(pj) : nullptr;
@@ -107,18 +108,18 @@ std::optional<int> epsg_of(std::string_view written) {
 }
 
 /// The one operation that PROJ takes at this place, longitude and easting first; null where there is none.
-Owned operation_at(PJ_CONTEXT* context, const PJ* from, const PJ* to, const PJ_COORD& at) {
+ProjHandle operation_at(PJ_CONTEXT* context, const PJ* from, const PJ* to, const PJ_COORD& at) {
   const char* const options[] = {"ALLOW_BALLPARK=NO", nullptr};
-  const Owned found{proj_create_crs_to_crs_from_pj(context, from, to, nullptr, options)};
-  if (found.pj == nullptr) return Owned();
-  Owned all{proj_normalize_for_visualization(context, found.pj)};
-  if (all.pj == nullptr) return Owned();
+  const ProjHandle found{proj_create_crs_to_crs_from_pj(context, from, to, nullptr, options)};
+  if (found.pj == nullptr) return ProjHandle();
+  ProjHandle all{proj_normalize_for_visualization(context, found.pj)};
+  if (all.pj == nullptr) return ProjHandle();
   const PJ_COORD out = proj_trans(all.pj, PJ_FWD, at);
   if (!std::isfinite(out.xyz.x) || !std::isfinite(out.xyz.y)) {
     proj_errno_reset(all.pj);
     return all;  // the caller finds the place outside
   }
-  Owned used{proj_trans_get_last_used_operation(all.pj)};
+  ProjHandle used{proj_trans_get_last_used_operation(all.pj)};
   return used.pj != nullptr ? std::move(used) : std::move(all);
 }
 
@@ -179,12 +180,13 @@ Result<void> read_heights(std::string_view text, SourceCrsSpec& spec) {
 /// Of a system's own datum where networks give it, else of the one with the smallest error of the change.
 Result<void> SourceCrs::find_horizontal(Operations& of, PJ* crs, const SourceCrsSpec& spec,
                                         const Eigen::Vector3d& first) {
-  const Owned base{proj_crs_get_geodetic_crs(of.context, crs)};
+  const ProjHandle base{proj_crs_get_geodetic_crs(of.context, crs)};
   double best_m = HUGE_VAL;
   const auto consider = [&](int target) {
-    const Owned to{proj_create(of.context, code(target).c_str())};
+    const ProjHandle to{proj_create(of.context, epsg_text(target).c_str())};
     if (to.pj == nullptr) return;
-    Owned found = operation_at(of.context, crs, to.pj, proj_coord(first.x(), first.y(), first.z(), HUGE_VAL));
+    ProjHandle found =
+        operation_at(of.context, crs, to.pj, proj_coord(first.x(), first.y(), first.z(), HUGE_VAL));
     const double error_m =
         found.pj != nullptr ? proj_coordoperation_get_accuracy(of.context, found.pj) : HUGE_VAL;
     if (!(error_m >= 0) || error_m >= best_m) return;
@@ -193,7 +195,7 @@ Result<void> SourceCrs::find_horizontal(Operations& of, PJ* crs, const SourceCrs
     of.horizontal = std::move(found);
   };
   for (const auto& own : k_own_datums) {
-    const Owned flat{proj_create(of.context, code(own.flat_epsg).c_str())};
+    const ProjHandle flat{proj_create(of.context, epsg_text(own.flat_epsg).c_str())};
     if (base.pj != nullptr && flat.pj != nullptr &&
         proj_is_equivalent_to_with_ctx(of.context, base.pj, flat.pj,
                                        PJ_COMP_EQUIVALENT_EXCEPT_AXIS_ORDER_GEOGCRS) != 0)
@@ -222,17 +224,18 @@ Result<void> SourceCrs::find_vertical(Operations& of, const SourceCrsSpec& spec,
   if (spec.separation_m)
     heights_ += ", made of heights above a geoid " + metres(*spec.separation_m) + " above it";
   if (!spec.height_epsg) return boost::outcome_v2::success();
-  const Owned vertical{proj_create(of.context, code(*spec.height_epsg).c_str())};
-  if (vertical.pj == nullptr) return make_error(Errc::not_found, "PROJ knows no " + code(*spec.height_epsg));
+  const ProjHandle vertical{proj_create(of.context, epsg_text(*spec.height_epsg).c_str())};
+  if (vertical.pj == nullptr)
+    return make_error(Errc::not_found, "PROJ knows no " + epsg_text(*spec.height_epsg));
   const std::string name = name_of(vertical.pj);
   if (proj_get_type(vertical.pj) != PJ_TYPE_VERTICAL_CRS)
-    return make_error(Errc::invalid_argument, code(*spec.height_epsg) + " (" + name +
+    return make_error(Errc::invalid_argument, epsg_text(*spec.height_epsg) + " (" + name +
                                                   ") is no system of heights, such as EPSG:5773 (EGM96)");
   BOOST_OUTCOME_TRY(const Wgs84 flat, converted(of, first));
   for (const auto& [flat_epsg, full_epsg] : {std::pair{4326, 4979}, {4258, 4937}}) {
-    const std::string both = code(flat_epsg) + "+" + std::to_string(*spec.height_epsg);
-    const Owned from{proj_create(of.context, both.c_str())},
-        to{proj_create(of.context, code(full_epsg).c_str())};
+    const std::string both = epsg_text(flat_epsg) + "+" + std::to_string(*spec.height_epsg);
+    const ProjHandle from{proj_create(of.context, both.c_str())},
+        to{proj_create(of.context, epsg_text(full_epsg).c_str())};
     if (from.pj == nullptr || to.pj == nullptr) continue;
     of.vertical =
         operation_at(of.context, from.pj, to.pj, proj_coord(flat.lon_deg, flat.lat_deg, first.z(), HUGE_VAL));
@@ -254,10 +257,10 @@ Result<void> SourceCrs::prepare(const SourceCrsSpec& spec, const Eigen::Vector3d
   separation_m_ = spec.separation_m;
   auto made = operations_->lock();
   PJ_CONTEXT* context = made->context;
-  Owned crs{proj_create(context, code(*epsg).c_str())};
-  if (crs.pj == nullptr) return make_error(Errc::not_found, "PROJ knows no " + code(*epsg));
+  ProjHandle crs{proj_create(context, epsg_text(*epsg).c_str())};
+  if (crs.pj == nullptr) return make_error(Errc::not_found, "PROJ knows no " + epsg_text(*epsg));
   name_ = name_of(crs.pj);
-  const std::string shown = code(*epsg) + " (" + name_ + ")";
+  const std::string shown = epsg_text(*epsg) + " (" + name_ + ")";
   const PJ_TYPE type = proj_get_type(crs.pj);
   projected_ = type == PJ_TYPE_PROJECTED_CRS;
   geocentric_ = type == PJ_TYPE_GEOCENTRIC_CRS;
@@ -270,8 +273,8 @@ Result<void> SourceCrs::prepare(const SourceCrsSpec& spec, const Eigen::Vector3d
     return make_error(Errc::invalid_argument, shown + " is no system of positions");
   // Heights go their own way.
   const auto own = std::ranges::find(k_own_datums, *epsg, &OwnDatum::full_epsg);
-  if (own != k_own_datums.end()) crs = Owned(proj_create(context, code(own->flat_epsg).c_str()));
-  const Owned conversion{projected_ ? proj_crs_get_coordoperation(context, crs.pj) : nullptr};
+  if (own != k_own_datums.end()) crs = ProjHandle(proj_create(context, epsg_text(own->flat_epsg).c_str()));
+  const ProjHandle conversion{projected_ ? proj_crs_get_coordoperation(context, crs.pj) : nullptr};
   const char* method = nullptr;
   if (conversion.pj != nullptr)
     proj_coordoperation_get_method_info(context, conversion.pj, &method, nullptr, nullptr);
