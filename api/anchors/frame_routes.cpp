@@ -273,10 +273,10 @@ Response transform(AnchorApi& s, const Request& request) {
     out.push_back({there.x(), there.y(), there.z()});
   }
   refuse_if_any(errors);
-  Ordered body{
+  Ordered moved{
       {"from", k_space_words.word(*from)}, {"to", k_space_words.word(*to)}, {"points", std::move(out)}};
-  if (context.source) body["source"] = source_json(*context.source, *first);
-  return json_response(200, body);
+  if (context.source) moved["source"] = source_json(*context.source, *first);
+  return json_response(200, moved);
 }
 
 }  // namespace

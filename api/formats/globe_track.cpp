@@ -26,7 +26,10 @@ std::string note_of(const SourceCrs& crs, const Wgs84& first, double convergence
 
 Result<void> put_on_globe(FlightData& flight, const SourceCrsSpec& spec, AttitudeOf attitude) {
   if (flight.fixes.empty()) return make_error(Errc::invalid_argument, "the track has no position");
-  const Eigen::Vector3d first_m = flight.fixes.front().local_m;
+  // Zeros are what a receiver without a fix writes.
+  const auto first = std::ranges::find_if(
+      flight.fixes, [](const Fix& fix) { return fix.local_m.x() != 0 || fix.local_m.y() != 0; });
+  const Eigen::Vector3d first_m = (first == flight.fixes.end() ? flight.fixes.begin() : first)->local_m;
   BOOST_OUTCOME_TRY(const auto crs, SourceCrs::open(spec, first_m));
   const double convergence_rad = crs.convergence_rad(first_m);
   // One turn for a flight: within 300 m of it the convergence changes by less than 0.01 degrees.

@@ -44,7 +44,7 @@ export const FIELD_WORDS: Record<(typeof TRACK_FIELDS)[number] | (typeof RANGE_F
 const TIMES =
   't_s t_us t_ms t_ns time time_s time_ms time_us time_ns time_utc time_utc_usec timestamp timestamp_s timestamp_ms timestamp_us timestamp_ns t utc ' +
   'gpst gps_time unix datetime date_time zeit';
-const NAMES: Readonly<Record<Field, string>> = {
+export const NAMES: Readonly<Record<Field, string>> = {
   time: TIMES,
   lat: 'lat_deg lat latitude latitude_deg breite',
   lon: 'lon_deg lon lng longitude longitude_deg laenge',

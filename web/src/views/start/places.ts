@@ -13,7 +13,8 @@ export function place_kind(t: Table, c: Columns): PlaceKind {
   if ([c.x, c.y, c.z].some((name) => /ecef/.test(plain(name ?? '')))) return 'ecef';
   const axes = [c.x, c.y, c.z].map((name) => numbers_of(t, name)),
     from_centre_m = Math.hypot(...axes.map((a) => a[0] ?? 0));
-  if (from_centre_m > 6.3e6 && from_centre_m < 6.4e6) return 'ecef';
+  // On the surface of the earth, and not a northing of that size with a height beside it.
+  if (from_centre_m > 6.3e6 && from_centre_m < 6.4e6 && beyond(axes[2]!, MOST_LOCAL_M)) return 'ecef';
   return axes.some((a) => beyond(a, MOST_LOCAL_M)) ? 'map' : 'local';
 }
 
