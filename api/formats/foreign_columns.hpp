@@ -25,7 +25,8 @@ inline constexpr std::array k_foreign_fields{
     FieldNames{"lat", "lat_deg lat latitude latitude_deg breite"},
     FieldNames{"lon", "lon_deg lon lng longitude longitude_deg laenge"},
     FieldNames{"height",
-               "h_m ellipsoidal_height height_ellipsoid height_ellipsoid_m ellipsoid_height "
+               "h_m h_ell h_ell_m height_ell hoehe_ell ell_height "
+               "ellipsoidal_height height_ellipsoid height_ellipsoid_m ellipsoid_height "
                "altitude_ellipsoid_m alt_ellipsoid alt_hae hae alt_m height_m alt altitude height h "
                "altitude_m hoehe alt_msl alt_msl_m altitude_msl altitude_msl_m height_msl "
                "height_msl_m msl hmsl orthometric_height"},
