@@ -159,11 +159,12 @@ Result<FlightDeclaration> read_flight_json(const std::filesystem::path& file) {
     std::error_code ignored;
     return make_error(
         Errc::not_found,
-        file.string() +
-            (std::filesystem::exists(file, ignored)
-                 ? ": cannot be opened"
-                 : ": not there. A flight folder has flight.json, ranges.csv and track.csv "
-                   "(docs/formats.md); tables of other programs: Import a flight in the dashboard"));
+        file.string() + (std::filesystem::exists(file, ignored)
+                             ? ": cannot be opened"
+                             : ": not there. A flight folder has flight.json, ranges.csv and track.csv "
+                               "(docs/formats.md); tables of other programs: --track and --ranges, or Import "
+                               "a flight in the "
+                               "dashboard"));
   }
   constexpr std::size_t k_max_bytes = 1 << 20;
   std::string text(k_max_bytes + 1, '\0');

@@ -92,8 +92,8 @@ it.each((file('cases.json') as readonly Case[]).map((c) => [c.name, c] as const)
       const { tag, anchor, ...rest } = r as { tag: number; anchor: number };
       return {
         ...rest,
-        tag: expect.toSatisfy((t: string) => Number(t) === tag),
-        anchor: expect.toSatisfy((t: string) => Number(t) === anchor),
+        tag: expect.toSatisfy((t: string) => Number(t) === tag) as string,
+        anchor: expect.toSatisfy((t: string) => Number(t) === anchor) as string,
       };
     }),
   );

@@ -49,7 +49,8 @@ export const NAMES: Readonly<Record<Field, string>> = {
   lat: 'lat_deg lat latitude latitude_deg breite',
   lon: 'lon_deg lon lng longitude longitude_deg laenge',
   height:
-    'h_m h_ell h_ell_m height_ell hoehe_ell ell_height ellipsoidal_height height_ellipsoid height_ellipsoid_m ellipsoid_height altitude_ellipsoid_m alt_ellipsoid alt_hae hae ' +
+    'h_m h_ell h_ell_m height_ell hoehe_ell ell_height ellipsoidal_height height_ellipsoid ' +
+    'height_ellipsoid_m ellipsoid_height altitude_ellipsoid_m alt_ellipsoid alt_hae hae ' +
     'alt_m height_m alt altitude height h altitude_m hoehe alt_msl alt_msl_m altitude_msl altitude_msl_m height_msl height_msl_m msl hmsl orthometric_height',
   separation:
     'geoid_separation geoid_separation_m geoid_sep geoidal_separation undulation undulation_m geoid_height geoid_height_m geoid_undulation',
