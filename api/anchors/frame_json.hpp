@@ -14,9 +14,12 @@
 namespace anchord::api {
 
 /// What the numbers of POST /transform are.
-enum class Space : std::uint8_t { geo, enu, projected, local };
-inline constexpr auto k_space_words = enum_table<Space>(
-    {{"geo", Space::geo}, {"enu", Space::enu}, {"projected", Space::projected}, {"local", Space::local}});
+enum class Space : std::uint8_t { geo, enu, projected, local, crs };
+inline constexpr auto k_space_words = enum_table<Space>({{"geo", Space::geo},
+                                                         {"enu", Space::enu},
+                                                         {"projected", Space::projected},
+                                                         {"local", Space::local},
+                                                         {"crs", Space::crs}});
 
 /// What LocalFrame::definition holds once a frame was fitted.
 struct FrameDefinition {

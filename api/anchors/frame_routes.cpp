@@ -1,5 +1,6 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <numbers>
 
 #include "api/anchors/frame_json.hpp"
 #include "api/anchors/geo_service.hpp"
@@ -8,6 +9,7 @@
 #include "api/kit/reader.hpp"
 #include "api/kit/support.hpp"
 #include "core/geo/enu.hpp"
+#include "core/geo/source_crs.hpp"
 #include "core/ports/frame_store.hpp"
 #include "core/ports/revision_store.hpp"
 #include "core/ports/site_store.hpp"
@@ -136,6 +138,7 @@ struct Context {
   std::optional<FrameDefinition> frame{};
   std::optional<EnuFrame> enu{};
   const Projection* projection{nullptr};
+  std::optional<SourceCrs> source{};
 
   Wgs84 geo_from(Space space, const Eigen::Vector3d& at) const {
     switch (space) {
@@ -147,6 +150,8 @@ struct Context {
         return value_or_problem(projection->geographic(at.head<2>(), at.z()));
       case Space::local:
         return EnuFrame(frame->origin).wgs84_from_enu({frame->fit.transform.enu_from(at)});
+      case Space::crs:
+        return value_or_problem(source->wgs84(at));
     }
     return {};
   }
@@ -162,10 +167,40 @@ struct Context {
       }
       case Space::local:
         return frame->fit.transform.local_from(EnuFrame(frame->origin).enu_from_wgs84(at).m);
+      case Space::crs:
+        break;  // refused before: nobody asks for it
     }
     return {};
   }
 };
+
+std::optional<Eigen::Vector3d> three_numbers(const nlohmann::json& point) {
+  if (!point.is_array() || point.size() != 3) return std::nullopt;
+  for (const auto& number : point)
+    if (!number.is_number()) return std::nullopt;
+  return Eigen::Vector3d(point[0].get<double>(), point[1].get<double>(), point[2].get<double>());
+}
+
+/// What a request says of positions of another system.
+SourceCrsSpec read_source(Fields& fields, bool wanted) {
+  SourceCrsSpec spec;
+  const auto crs = fields.text("crs", 40, wanted), heights = fields.text("heights", 40);
+  spec.crs = crs.value_or("");
+  spec.max_datum_error_m = fields.number("max_datum_error_m", 0, 100).value_or(spec.max_datum_error_m);
+  if (heights) {
+    if (const auto read = read_heights(*heights, spec); !read)
+      fields.error("heights", "unknown_value", read.error().message);
+  }
+  return spec;
+}
+
+Ordered source_json(const SourceCrs& source, const Eigen::Vector3d& first) {
+  return {{"name", source.name()},
+          {"datum", source.datum()},
+          {"datum_error_m", source.datum_error_m()},
+          {"heights", source.heights()},
+          {"convergence_deg", source.convergence_rad(first) * 180 / std::numbers::pi}};
+}
 
 Response transform(AnchorApi& s, const Request& request) {
   std::vector<FieldError> errors;
@@ -175,7 +210,9 @@ Response transform(AnchorApi& s, const Request& request) {
   const auto frame_name = fields.text("frame", 80);
   const auto site_text = fields.text("site", 36);
   const auto* points = fields.child("points");
+  const SourceCrsSpec spec = read_source(fields, from == Space::crs);
   fields.finish();
+  if (to == Space::crs) errors.push_back({"/to", "unknown_value", "crs is what points come from"});
   if (points == nullptr || !points->is_array() || points->size() > 10'000)
     errors.push_back({"/points", "wrong_type", "must be an array of at most 10000 points"});
   refuse_if_any(errors);
@@ -216,24 +253,30 @@ Response transform(AnchorApi& s, const Request& request) {
         errors.push_back({"/site", "no_projection", projection.error().message});
     }
   }
+  const auto first = points->empty() ? std::nullopt : three_numbers(points->front());
+  if (from == Space::crs && first) {
+    if (auto source = SourceCrs::open(spec, *first))
+      context.source.emplace(std::move(source).value());
+    else
+      errors.push_back({"/crs", "no_crs", source.error().message});
+  }
   refuse_if_any(errors);
   Ordered out = Ordered::array();
   for (std::size_t i = 0; i < points->size(); ++i) {
-    const auto& point = (*points)[i];
-    const bool good = point.is_array() && point.size() == 3 && point[0].is_number() && point[1].is_number() &&
-                      point[2].is_number();
-    if (!good || (from == Space::geo && std::abs(point[1].get<double>()) > 90)) {
+    const auto at = three_numbers((*points)[i]);
+    if (!at || (from == Space::geo && std::abs(at->y()) > 90)) {
       errors.push_back({"/points/" + std::to_string(i), "wrong_type", "must be three numbers of the space"});
       continue;
     }
-    const Eigen::Vector3d at(point[0].get<double>(), point[1].get<double>(), point[2].get<double>());
-    const auto there = context.to(*to, context.geo_from(*from, at));
+    if (!errors.empty()) continue;  // the first point may be none, and then there is no system
+    const auto there = context.to(*to, context.geo_from(*from, *at));
     out.push_back({there.x(), there.y(), there.z()});
   }
   refuse_if_any(errors);
-  return json_response(
-      200,
-      {{"from", k_space_words.word(*from)}, {"to", k_space_words.word(*to)}, {"points", std::move(out)}});
+  Ordered moved{
+      {"from", k_space_words.word(*from)}, {"to", k_space_words.word(*to)}, {"points", std::move(out)}};
+  if (context.source) moved["source"] = source_json(*context.source, *first);
+  return json_response(200, moved);
 }
 
 }  // namespace

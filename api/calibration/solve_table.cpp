@@ -60,7 +60,7 @@ std::string solve_table(std::span<const SolvedFlight> flights) {
            s.shared.curve_m.value, s.shared.curve_m.sigma, s.shared.lag_s.value, s.shared.lag_s.sigma,
            s.shared.lever_up_m.value, s.shared.lever_up_m.sigma);
     append(out, "%-10s %15s %15s %10s %8s %8s %-14s %7s %8s %8s\n", "anchor", globe ? "lat" : "x_m",
-           globe ? "lon" : "y_m", globe ? "height_m" : "z_m", "h95_m", "v95_m", "verdict", "gdop", "used",
+           globe ? "lon" : "y_m", globe ? "h_ellips_m" : "z_m", "h95_m", "v95_m", "verdict", "gdop", "used",
            "refused");
     for (const auto& anchor : s.anchors) {
       const Estimate& e = anchor.estimate;

@@ -10,6 +10,7 @@
 
 #include "api/formats/csv_table.hpp"
 #include "api/formats/flight_json.hpp"
+#include "api/formats/globe_track.hpp"
 #include "api/wire/exclusion_json.hpp"
 #include "core/base/text.hpp"
 
@@ -33,6 +34,7 @@ class PoseColumns {
   static Result<PoseColumns> of(const CsvTable& table, const FlightDeclaration& flight) {
     PoseColumns c;
     c.globe_ = flight.mission.frame == TrackFrame::wgs84;
+    c.other_system_ = flight.source.has_value();
     c.heading_add_deg_ = flight.heading_add_deg;
     constexpr std::array<const char*, 3> globe{"lat_deg", "lon_deg", "alt_m"};
     constexpr std::array<const char*, 3> local{"x_m", "y_m", "z_m"};
@@ -71,10 +73,16 @@ class PoseColumns {
     }
     if (globe_) {
       if (std::abs(p[0]) > 90 || std::abs(p[1]) > 180)
-        return table.error("lat_deg or lon_deg outside the globe");
+        return table.error(
+            "lat_deg or lon_deg outside the globe; metres of a map are frame crs of flight.json, in x_m, "
+            "y_m, "
+            "z_m");
       fix.position = {p[0], p[1], p[2]};
     } else {
       fix.local_m = {p[0], p[1], p[2]};
+      if (!other_system_ && is_of_a_map(fix.local_m))
+        return table.error(std::string("x_m, y_m, z_m are ") + k_of_a_map +
+                           ": frame crs and crs in track of flight.json (docs/formats.md)");
     }
     BOOST_OUTCOME_TRY(fix.fix, fix_class(table));
     BOOST_OUTCOME_TRY(const auto sd_h, table.number(sd_h_));
@@ -116,7 +124,7 @@ class PoseColumns {
                        "', expected 2 (fixed), 1 (float), 0 (neither), or fixed, float, dgps, single, none");
   }
 
-  bool globe_{false};
+  bool globe_{false}, other_system_{false};
   double heading_add_deg_{0};
   std::array<std::size_t, 3> position_{};
   std::array<std::optional<std::size_t>, 4> quaternion_{};
@@ -145,7 +153,7 @@ Result<void> read_track(const std::filesystem::path& folder, const FlightDeclara
   BOOST_OUTCOME_TRY(const std::size_t t, table.require("t_s"));
   BOOST_OUTCOME_TRY(const auto pose, PoseColumns::of(table, flight));
   note_unknown(table, "track", {}, flight, data);
-  if (!pose.has_fix_class() && flight.mission.frame == TrackFrame::wgs84) {
+  if (!pose.has_fix_class() && (flight.mission.frame == TrackFrame::wgs84 || flight.source)) {
     data.notes.push_back("track: no column fix, every position is taken as RTK fixed");
   }
   std::size_t not_finite = 0;
@@ -284,6 +292,12 @@ Result<FlightData> read_flight_folder(const std::filesystem::path& folder) {
     BOOST_OUTCOME_TRY(read_track(folder, flight, data));
   }
   BOOST_OUTCOME_TRY(read_ranges(folder, flight, data));
+  if (flight.source) {
+    const auto put = put_on_globe(data, *flight.source, AttitudeOf::axes);
+    if (!put)
+      return make_error(put.error().code,
+                        (folder / "flight.json").string() + ": track: " + put.error().message);
+  }
   BOOST_OUTCOME_TRY(read_exclusions(folder / "exclusions.json", data));
   return data;
 }

@@ -59,14 +59,31 @@ class Reader {
   std::optional<Error>& error_;
 };
 
+/// Coordinates of another system, in x_m, y_m, z_m.
+void read_source(Reader& r, FlightDeclaration& flight) {
+  flight.mission.frame = TrackFrame::local;
+  SourceCrsSpec spec;
+  spec.crs = r.text("crs", true);
+  spec.max_datum_error_m = r.number("max_datum_error_m", spec.max_datum_error_m);
+  if (const auto heights = r.text("heights", false); !heights.empty()) {
+    if (const auto read = read_heights(heights, spec); !read) r.fail(read.error().message);
+  }
+  flight.source = spec;
+}
+
 void read_track(Reader r, FlightDeclaration& flight, const std::string& file, std::optional<Error>& error) {
-  r.allow({"frame", "point", "in", "attitude", "heading_column", "heading_enu_ccw_from_east_deg"});
+  r.allow({"frame", "crs", "heights", "max_datum_error_m", "point", "in", "attitude", "heading_column",
+           "heading_enu_ccw_from_east_deg"});
   const std::string frame = r.text("frame", true);
   if (const auto known = k_frame_words.find(frame)) {
     flight.mission.frame = *known;
+  } else if (frame == "crs") {
+    read_source(r, flight);
   } else {
-    r.fail("'frame' is '" + frame + "', expected one of " + list_of(k_frame_words.words()));
+    r.fail("'frame' is '" + frame + "', expected one of " + list_of(k_frame_words.words()) + ", crs");
   }
+  if (!flight.source && (r.find("crs") || r.find("heights") || r.find("max_datum_error_m")))
+    r.fail("'crs', 'heights' and 'max_datum_error_m' are of the frame crs");
   const std::string point = r.text("point", true);
   if (const auto known = k_point_words.find(point)) {
     flight.mission.point = *known;
@@ -142,11 +159,12 @@ Result<FlightDeclaration> read_flight_json(const std::filesystem::path& file) {
     std::error_code ignored;
     return make_error(
         Errc::not_found,
-        file.string() +
-            (std::filesystem::exists(file, ignored)
-                 ? ": cannot be opened"
-                 : ": not there. A flight folder has flight.json, ranges.csv and track.csv "
-                   "(docs/formats.md); tables of other programs: Import a flight in the dashboard"));
+        file.string() + (std::filesystem::exists(file, ignored)
+                             ? ": cannot be opened"
+                             : ": not there. A flight folder has flight.json, ranges.csv and track.csv "
+                               "(docs/formats.md); tables of other programs: --track and --ranges, or Import "
+                               "a flight in the "
+                               "dashboard"));
   }
   constexpr std::size_t k_max_bytes = 1 << 20;
   std::string text(k_max_bytes + 1, '\0');

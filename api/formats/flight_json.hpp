@@ -5,6 +5,7 @@
 #include <string>
 
 #include "core/base/result.hpp"
+#include "core/geo/source_crs.hpp"
 #include "core/types/mission.hpp"
 
 namespace anchord {
@@ -12,7 +13,9 @@ namespace anchord {
 /// flight.json: what an operator declares about a flight. Layout in docs/formats.md.
 struct FlightDeclaration {
   Mission mission;
-  UtcTime epoch{};              ///< t_s = 0
+  UtcTime epoch{};  ///< t_s = 0
+  /// The track is in another system, still to be put on the globe; mission.frame is local until then.
+  std::optional<SourceCrsSpec> source{};
   bool track_in_ranges{false};  ///< the pose stands in each range row
   bool quaternion{false};
   std::string heading_column;  ///< empty: none

@@ -75,8 +75,39 @@ std::optional<NetworkId> read_network_id(Fields& fields, std::string_view key) {
   return std::nullopt;
 }
 
+constexpr double k_no_angle_deg = 360;
+constexpr const char* k_of_a_map =
+    " are of a map or earth-centred (UTM, a national grid, ECEF): make longitude and latitude of them, "
+    "POST /api/v1/transform with \"from\": \"crs\"";
+
+bool beyond(const Json* value, double most) {
+  return value != nullptr && value->is_number() && std::abs(value->get<double>()) > most;
+}
+
+/// Numbers of a map stand where others are expected; reported with what to do, and not read.
+bool of_a_map(Fields& fields) {
+  bool found = false;
+  for (const char* key : {"lon", "lat"}) {
+    if (!beyond(fields.child(key), k_no_angle_deg)) continue;
+    fields.error(key, "out_of_range", std::string("must be degrees; numbers this large") + k_of_a_map);
+    found = true;
+  }
+  const Json* local_m = fields.child("local_m");
+  if (local_m == nullptr || !local_m->is_array()) return found;
+  const bool far = std::ranges::any_of(*local_m, [](const Json& x) { return beyond(&x, k_local_m.max); });
+  if (far)
+    fields.error(
+        "local_m", "out_of_range",
+        std::string("must be within 100 km of the zero of the frame; numbers this large") + k_of_a_map);
+  return found || far;
+}
+
 void read_position(Fields& fields, Fix& fix) {
   const bool local = fields.has("local_m");
+  if (of_a_map(fields)) {
+    fields.child("h_m");
+    return;
+  }
   const auto local_m = read_array<3>(fields, "local_m", k_local_m);
   if (local) {
     fix.frame = TrackFrame::local;

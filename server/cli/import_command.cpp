@@ -12,6 +12,7 @@
 #include "core/ports/mission_store.hpp"
 #include "server/cli/commands.hpp"
 #include "server/cli/config_flags.hpp"
+#include "server/cli/flight_source.hpp"
 #include "server/cli/flight_upload.hpp"
 #include "server/cli/progress.hpp"
 #include "server/storage/postgres_database.hpp"
@@ -21,6 +22,7 @@ namespace {
 
 struct Options {
   std::string folder, url, data_dir, database, token_file, name;
+  ForeignSource foreign;
 };
 
 std::string name_of(const Options& options, const FlightData& flight) {
@@ -107,12 +109,22 @@ Result<std::string> import_into_folder(const Options& options, FlightData flight
   return to_string(mission.id);
 }
 
+Result<FlightData> read_flight(const Options& options) {
+  if (options.folder.empty() == !options.foreign.given())
+    return make_error(Errc::invalid_argument,
+                      "a flight folder is needed, or --track and --ranges, and not both");
+  if (!options.foreign.given()) return read_flight_folder(options.folder);
+  BOOST_OUTCOME_TRY(auto flight, read_foreign_source(options.foreign));
+  return flight;
+}
+
 int import_flight(const Options& options) {
-  auto flight = read_flight_folder(options.folder);
+  auto flight = read_flight(options);
   if (!flight) {
     std::fprintf(stderr, "anchord import: %s\n", printable(flight.error().message).c_str());
     return 2;
   }
+  for (const auto& note : flight.value().notes) std::fprintf(stderr, "note: %s\n", printable(note).c_str());
   prepare_rows(flight.value());
   const auto id = options.data_dir.empty() ? import_by_rest(options, std::move(flight).value())
                                            : import_into_folder(options, std::move(flight).value());
@@ -133,8 +145,8 @@ void add_import_command(CLI::App& app, int& exit_code) {
       command->add_subcommand("flight", "One flight folder as a finished mission; prints the mission's id");
   auto options = std::make_shared<Options>();
   options->url = "http://127.0.0.1:8420";
-  flight->add_option("folder", options->folder, "Flight folder: flight.json, track.csv[.gz], ranges.csv[.gz]")
-      ->required();
+  flight->add_option("folder", options->folder,
+                     "Flight folder: flight.json, track.csv[.gz], ranges.csv[.gz]; or --track and --ranges");
   auto* url = flight->add_option("--url", options->url, "Running server")->capture_default_str();
   flight
       ->add_option("--data-dir", options->data_dir,
@@ -143,6 +155,7 @@ void add_import_command(CLI::App& app, int& exit_code) {
   add_database_option(*flight, options->database);
   flight->add_option("--token-file", options->token_file, "File with an access token (gateway and operator)");
   flight->add_option("--name", options->name, "Name of the mission; else that of the folder");
+  add_foreign_source(*flight, options->foreign);
   flight->callback([options, &exit_code] { exit_code = import_flight(*options); });
 }
 

@@ -14,6 +14,7 @@
 #include "core/localize/flight_solver.hpp"
 #include "core/localize/kit_prior.hpp"
 #include "server/cli/commands.hpp"
+#include "server/cli/flight_source.hpp"
 #include "server/cli/learning_data.hpp"
 #include "server/cli/solve_report.hpp"
 #include "server/cli/words.hpp"
@@ -40,6 +41,7 @@ struct Arguments {
   bool likelihood{true}, ask_worth{true};
   AnchorMethod method{AnchorMethod::joint};
   SolveReportOptions report;
+  ForeignSource foreign;
 };
 
 int complain(const Error& error) {
@@ -95,9 +97,18 @@ Result<FlightOptions> options_of(const Arguments& a) {
   return options;
 }
 
-Result<std::vector<FlightData>> read_all(const std::vector<std::string>& folders) {
+Result<std::vector<FlightData>> read_all(const Arguments& a) {
   std::vector<FlightData> flights;
-  for (const auto& folder : folders) {
+  if (a.folders.empty() && !a.foreign.given())
+    return make_error(Errc::invalid_argument, "a flight folder is needed, or --track and --ranges");
+  if (a.foreign.given()) {
+    BOOST_OUTCOME_TRY(auto flight, read_foreign_source(a.foreign));
+    std::fprintf(stderr, "%s: %zu positions, %zu ranges\n", flight.mission.name.c_str(), flight.fixes.size(),
+                 flight.ranges.size());
+    for (const auto& note : flight.notes) std::fprintf(stderr, "note: %s\n", printable(note).c_str());
+    flights.push_back(std::move(flight));
+  }
+  for (const auto& folder : a.folders) {
     std::fprintf(stderr, "reading %s\n", folder.c_str());
     BOOST_OUTCOME_TRY(auto flight, read_flight_folder(folder));
     std::fprintf(stderr, "  %zu positions, %zu ranges\n", flight.fixes.size(), flight.ranges.size());
@@ -165,7 +176,7 @@ std::vector<const FlightData*> pointers(const std::vector<FlightData>& flights) 
 int solve(const Arguments& a) {
   const auto options = options_of(a);
   if (!options) return complain(options.error());
-  auto flights = read_all(a.folders);
+  auto flights = read_all(a);
   if (!flights) return complain(flights.error());
   if (const auto fits = check_profile_kit(options.value(), flights.value()); !fits)
     return complain(fits.error());
@@ -225,7 +236,7 @@ int solve(const Arguments& a) {
 int fit_profile(const Arguments& a) {
   const auto options = options_of(a);
   if (!options) return complain(options.error());
-  const auto flights = read_all(a.folders);
+  const auto flights = read_all(a);
   if (!flights) return complain(flights.error());
   if (const auto fits = check_profile_kit(options.value(), flights.value()); !fits)
     return complain(fits.error());
@@ -280,10 +291,8 @@ int show_profile(const std::string& file) {
 }
 
 void add_options(CLI::App& command, Arguments& a) {
-  command
-      .add_option("flights", a.folders,
-                  "Flight folders (docs/formats.md); flights of one kit learn from each other")
-      ->required();
+  command.add_option("flights", a.folders,
+                     "Flight folders (docs/formats.md); flights of one kit learn from each other");
   add_word(command, "--solver", a.solver, k_solver_words, "How the minimum is searched");
   add_word(command, "--weights", a.weights, k_weights_words,
            "inverse_variance, or dissertation: as eq 7.11 is printed");
@@ -324,6 +333,7 @@ void add_solve_command(CLI::App& app, int& exit_code) {
   auto* command = app.add_subcommand("solve", "Find the anchors of recorded flights, without a server");
   auto arguments = std::make_shared<Arguments>();
   add_options(*command, *arguments);
+  add_foreign_source(*command, arguments->foreign);
   auto* priors = command->add_option(
       "--priors", arguments->priors,
       "JSON: outline, bearings, heights, RSS: priors that separate an anchor from its mirror "

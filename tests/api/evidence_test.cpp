@@ -161,6 +161,31 @@ TEST_F(EvidenceRoutes, AKitLearnsFromItsFlightsAndTellsTheNext) {
   EXPECT_EQ(call(Method::put, "/api/v1/devices/other/profile", file, with("if-match", "*")).status, 404);
 }
 
+TEST_F(EvidenceRoutes, TransformsPositionsOfAnotherProgramsSystem) {
+  // gdaltransform -s_srs EPSG:4979 -t_srs EPSG:25832 of 11.576124 48.137154.
+  const std::string map = R"("points":[[691650.366852,5334754.246451,520.0]])";
+  const auto answer = post("/api/v1/transform",
+                           R"({"from":"crs","to":"geo","crs":"EPSG:25832","heights":"45.25",)" + map + "}");
+  ASSERT_EQ(answer.status, 200) << answer.body;
+  const auto point = json(answer)["points"][0];
+  EXPECT_NEAR(point[0].get<double>(), 11.576124, 1e-8);
+  EXPECT_NEAR(point[1].get<double>(), 48.137154, 1e-8);
+  EXPECT_NEAR(point[2].get<double>(), 565.25, 1e-6);
+  EXPECT_EQ(json(answer)["source"]["datum"], "ETRS89");
+  EXPECT_NEAR(json(answer)["source"]["convergence_deg"].get<double>(), 1.919, 1e-3);  // GeographicLib, UTMUPS
+
+  const auto refused = [&](const std::string& what) {
+    const auto response = post("/api/v1/transform", "{" + what + "," + map + "}");
+    EXPECT_EQ(response.status, 422) << response.body;
+    return json(response)["errors"][0]["pointer"].get<std::string>();
+  };
+  EXPECT_EQ(refused(R"("from":"crs","to":"geo")"), "/crs");
+  EXPECT_EQ(refused(R"("from":"crs","to":"geo","crs":"EPSG:2056")"), "/crs") << "outside Switzerland";
+  EXPECT_EQ(refused(R"("from":"crs","to":"geo","crs":"EPSG:4326")"), "/crs") << "no degrees";
+  EXPECT_EQ(refused(R"("from":"crs","to":"geo","crs":"UTM 32N","heights":"sea")"), "/heights");
+  EXPECT_EQ(refused(R"("from":"geo","to":"crs","crs":"EPSG:25832")"), "/to");
+}
+
 TEST_F(EvidenceRoutes, FitsAFrameToPublishedAnchorsAndPlaces) {
   ASSERT_EQ(post("/api/v1/calibrations/" + stored() + "/publish", "{}").status, 201);
   const auto site = post("/api/v1/sites", R"({"name":"hall","origin":{"lon":3.713,"lat":51.023,"h_m":55},

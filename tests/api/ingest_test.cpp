@@ -244,6 +244,21 @@ TEST_F(Ingest, RefusesFixesThatAreNowhere) {
   EXPECT_EQ(code(R"("lon":3.7,"lat":51,"h_m":-501)"), "out_of_range");
   EXPECT_EQ(code(R"("local_m":[1,2,3])"), "wrong_frame");
 }
+TEST_F(Ingest, SaysOfMapCoordinatesWhatToDoWithThem) {
+  for (const char* place :
+       {R"("lon":691650.4,"lat":5334754.2,"h_m":565)", R"("local_m":[691650.4,5334754.2,565])",
+        R"("local_m":[4178000.1,855806.0,4727488.2])", R"("local_m":[530000,180000,50])"}) {
+    const auto response = post("/api/v1/fixes", fix(1, place), "application/x-ndjson");
+    EXPECT_EQ(response.status, 422) << place;
+    const auto error = json(response)["errors"][0];
+    EXPECT_EQ(error["code"], "out_of_range") << place;
+    EXPECT_NE(error["detail"].get<std::string>().find("POST /api/v1/transform"), std::string::npos) << error;
+  }
+  const auto table = post("/api/v1/fixes", "t_us,x_m,y_m,z_m,fix\n1777889472000000,530000,180000,50,fixed\n",
+                          "text/csv", {{"mission", id_}});
+  EXPECT_EQ(table.status, 422) << table.body;
+  EXPECT_NE(table.body.find("POST /api/v1/transform"), std::string::npos) << table.body;
+}
 TEST_F(Ingest, KeepsAFixWithoutRtk) {
   std::string body = fix(1);
   body.replace(body.find("fixed"), 5, "none");

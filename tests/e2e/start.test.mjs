@@ -231,6 +231,8 @@ test('a flight out of a German spreadsheet, its anchors with names, gives the an
     .first()
     .evaluate((d) => (d.open = true));
   await id('column-of-fix').selectOption('Qualität');
+  assert.equal(await id('import-send').isEnabled(), false, 'nothing says what Höhe is above');
+  await id('import-heights-above').selectOption('ellipsoidal');
   await id('import-tag').fill('0x6e01');
   for (const [field, value] of [
     ['Forward, m', '0,12'],

@@ -38,7 +38,7 @@ const flight = (
     tc,
     r,
     rc,
-    { ...guessed_reading(t, tc, r, rc, declared), ...said },
+    { ...guessed_reading(t, tc, r, rc, declared), heights: 'ellipsoidal', ...said },
     { ...about, ...more },
     declared,
   );
@@ -48,6 +48,9 @@ const in_seconds: Reading = {
   range_time: { unit: 's', scale: 'utc' },
   range: 'm',
   fix: 'words',
+  crs: '',
+  heights: 'ellipsoidal',
+  height: 'm',
 };
 
 describe('a flight from files', () => {
@@ -257,7 +260,9 @@ describe('a flight of somebody else', () => {
   it('reads positions of RTKLIB', () => {
     const t = table_of(
         'rover.pos',
-        '% program   : RTKPOST\n% inp file  : a.obs\n%\n%  GPST                  latitude(deg) longitude(deg)  height(m)   Q  ns   ' +
+        '% program   : RTKPOST\n% inp file  : a.obs\n%\n' +
+          '% (lat/lon/height=WGS84/ellipsoidal,Q=1:fix,2:float,3:sbas,4:dgps,5:single,6:ppp,ns=# of satellites)\n' +
+          '%  GPST                  latitude(deg) longitude(deg)  height(m)   Q  ns   ' +
           'sdn(m)   sde(m)   sdu(m)  sdne(m)  sdeu(m)  sdun(m) age(s)  ratio\n' +
           '2026/05/04 10:00:19.500   51.023100000    3.713100000    57.2000   1  14   0.0100   0.0110   0.0200   0.0000   0.0000   0.0000   0.50   99.9\n',
       ),

@@ -69,6 +69,53 @@ TEST_F(FlightFolder, ReadsATrackOnTheGlobe) {
   EXPECT_EQ(flight.ranges[0].tag, flight.mission.tags[0].tag);
 }
 
+TEST_F(FlightFolder, RefusesMapCoordinatesAsALocalFrameOrAsDegrees) {
+  write("flight.json", R"({"track": {"frame": "local", "point": "body"}})");
+  write("ranges.csv", "t_s,anchor_id,range_m\n0.1,3,6.14\n");
+  for (const char* row : {"691650.4,5334754.2,565", "530000,180000,50", "4178000.1,855806.0,4727488.2"}) {
+    write("track.csv", std::string("t_s,x_m,y_m,z_m\n0.0,") + row + "\n");
+    expect_error("track.csv:2: x_m, y_m, z_m are beyond 100 km of zero");
+  }
+  write("flight.json", R"({"track": {"frame": "wgs84", "point": "body"}})");
+  write("track.csv", "t_s,lon_deg,lat_deg,alt_m\n0.0,691650.4,5334754.2,565\n");
+  expect_error("frame crs of flight.json");
+}
+
+TEST_F(FlightFolder, PutsATrackOfAMapOnTheGlobe) {
+  write("flight.json", R"({"track": {"frame": "crs", "crs": "EPSG:25832", "heights": "45.25", "point": "body",
+      "heading_column": "yaw"}})");
+  write("ranges.csv", "t_s,anchor_id,range_m\n0.1,3,6.14\n");
+  write("track.csv", "t_s,x_m,y_m,z_m,fix,sd_h_m,yaw\n0.0,691650.366852,5334754.246451,520,2,0.01,90\n");
+  const auto read = read_flight_folder(folder_);
+  ASSERT_TRUE(read) << read.error().message;
+  EXPECT_EQ(read.value().mission.frame, TrackFrame::wgs84);
+  const Fix& fix = read.value().fixes.at(0);
+  // gdaltransform -s_srs EPSG:4979 -t_srs EPSG:25832 of 11.576124 48.137154.
+  EXPECT_NEAR(fix.position.lon_deg, 11.576124, 1e-8);
+  EXPECT_NEAR(fix.position.lat_deg, 48.137154, 1e-8);
+  EXPECT_NEAR(fix.position.height_m, 565.25, 1e-6);
+  // Forward to grid north, which is 1.919 degrees east of north (GeographicLib, UTMUPS).
+  const Eigen::Vector3d forward = *fix.enu_from_body * Eigen::Vector3d::UnitX();
+  EXPECT_NEAR(std::atan2(forward.x(), forward.y()) * 180 / M_PI, 1.919, 1e-3);
+  ASSERT_FALSE(read.value().notes.empty());
+  EXPECT_NE(read.value().notes.back().find("from ETRS89 / UTM zone 32N to ETRS89"), std::string::npos)
+      << read.value().notes.back();
+}
+
+TEST_F(FlightFolder, SaysWhatIsWrongWithASystem) {
+  write("ranges.csv", "t_s,anchor_id,range_m\n0.1,3,6.14\n");
+  write("track.csv", "t_s,x_m,y_m,z_m\n0.0,691650.366852,5334754.246451,520\n");
+  write("flight.json", R"({"track": {"frame": "crs", "point": "body"}})");
+  expect_error("key 'crs' is missing");
+  write("flight.json", R"({"track": {"frame": "local", "crs": "EPSG:25832", "point": "body"}})");
+  expect_error("are of the frame crs");
+  write("flight.json", R"({"track": {"frame": "crs", "crs": "EPSG:2056", "point": "body"}})");
+  expect_error("flight.json: track: ");
+  write("flight.json",
+        R"({"track": {"frame": "crs", "crs": "EPSG:25832", "heights": "msl", "point": "body"}})");
+  expect_error("heights 'msl'");
+}
+
 TEST_F(FlightFolder, ReadsPosesOutOfTheRanges) {
   write("flight.json", k_local);
   write("ranges.csv", "t_s,anchor_id,range_m,x_m,y_m,z_m,qx,qy,qz,qw\n1,7,2.5,0.1,0.2,0.3,0,0,0,1\n");

@@ -22,6 +22,28 @@ export async function row_report(sending: Promise<unknown>): Promise<unknown> {
   }
 }
 
+type Place = readonly [number, number, number];
+/// Places of another system as longitude, latitude and ellipsoidal height; `what` says from what to what, in words.
+export async function on_globe(
+  places: readonly Place[],
+  source: { readonly crs: string; readonly heights: string },
+): Promise<{ readonly places: readonly Place[]; readonly what: string }> {
+  const out: Place[] = [];
+  let what = '';
+  for (let i = 0; i < places.length; i += BATCH) {
+    const { body } = await call('post', '/transform', {
+      body: { from: 'crs', to: 'geo', ...source, points: places.slice(i, i + BATCH).map((p) => [...p]) },
+    });
+    out.push(...body.points.map((p) => [p[0]!, p[1]!, p[2]!] as const));
+    const s = body.source;
+    if (s && !what)
+      what =
+        `positions from ${s.name} to ${s.datum}, heights ${s.heights}` +
+        (s.datum_error_m > 0 ? `, error of the datum ${s.datum_error_m} m` : '');
+  }
+  return { places: out, what };
+}
+
 /// `progress`: share of the rows that are in. Stopping leaves what is in, and an unfinished mission is finished.
 export async function send_flight(
   mission: Wire<'MissionCreate'>,

@@ -1,8 +1,20 @@
 /// What a column of a flight's tables can be, and the names under which loggers write it. No DOM.
-import type { Table } from './table_file';
+import { degrees_kind, type Table } from './table_file';
 
 /// Without those that `missing_*` names there is no flight.
-export const TRACK_FIELDS = ['time', 'lat', 'lon', 'height', 'x', 'y', 'z', 'fix', 'sigma_h', 'sigma_v'] as const;
+export const TRACK_FIELDS = [
+  'time',
+  'lat',
+  'lon',
+  'height',
+  'separation',
+  'x',
+  'y',
+  'z',
+  'fix',
+  'sigma_h',
+  'sigma_v',
+] as const;
 export const RANGE_FIELDS = ['time', 'anchor', 'range', 'tag', 'rss', 'rx', 'fp', 'seq'] as const;
 export type TrackField =
   (typeof TRACK_FIELDS)[number] | 'sigma_e' | 'sigma_n' | 'age' | 'satellites' | 'heading' | 'qx' | 'qy' | 'qz' | 'qw';
@@ -13,10 +25,11 @@ export const FIELD_WORDS: Record<(typeof TRACK_FIELDS)[number] | (typeof RANGE_F
   time: 'Time',
   lat: 'Latitude, °',
   lon: 'Longitude, °',
-  height: 'Height above ellipsoid, m',
-  x: 'x, m',
-  y: 'y, m',
-  z: 'z, m',
+  height: 'Height, m',
+  separation: 'Height of the geoid, m',
+  x: 'x or easting, m',
+  y: 'y or northing, m',
+  z: 'z or height, m',
   fix: 'Fix class',
   sigma_h: 'σ horizontal, m',
   sigma_v: 'σ vertical, m',
@@ -29,24 +42,28 @@ export const FIELD_WORDS: Record<(typeof TRACK_FIELDS)[number] | (typeof RANGE_F
   seq: 'Number of the row',
 };
 const TIMES =
-  't_s t_us t_ms t_ns time time_s time_ms time_us time_ns time_utc timestamp timestamp_s timestamp_ms timestamp_us timestamp_ns t utc ' +
+  't_s t_us t_ms t_ns time time_s time_ms time_us time_ns time_utc time_utc_usec timestamp timestamp_s timestamp_ms timestamp_us timestamp_ns t utc ' +
   'gpst gps_time unix datetime date_time zeit';
-const NAMES: Readonly<Record<Field, string>> = {
+export const NAMES: Readonly<Record<Field, string>> = {
   time: TIMES,
   lat: 'lat_deg lat latitude latitude_deg breite',
   lon: 'lon_deg lon lng longitude longitude_deg laenge',
   height:
-    'alt_m h_m height_m alt altitude height h ellipsoidal_height height_ellipsoid height_ellipsoid_m altitude_m hoehe',
-  x: 'x_m x e_m east east_m',
-  y: 'y_m y n_m north north_m',
-  z: 'z_m z u_m up up_m',
-  fix: 'fix fix_type quality fix_quality gps_qual rtk q carrsoln',
+    'h_m h_ell h_ell_m height_ell hoehe_ell ell_height ellipsoidal_height height_ellipsoid ' +
+    'height_ellipsoid_m ellipsoid_height altitude_ellipsoid_m alt_ellipsoid alt_hae hae ' +
+    'alt_m height_m alt altitude height h altitude_m hoehe alt_msl alt_msl_m altitude_msl altitude_msl_m height_msl height_msl_m msl hmsl orthometric_height',
+  separation:
+    'geoid_separation geoid_separation_m geoid_sep geoidal_separation undulation undulation_m geoid_height geoid_height_m geoid_undulation',
+  x: 'x_m x e_m east east_m easting easting_m e rechtswert ostwert x_ecef_m ecef_x ecef_x_m e_baseline_m',
+  y: 'y_m y n_m north north_m northing northing_m n hochwert nordwert y_ecef_m ecef_y ecef_y_m n_baseline_m',
+  z: 'z_m z u_m up up_m z_ecef_m ecef_z ecef_z_m u_baseline_m',
+  fix: 'fix fix_type quality fix_quality gps_qual rtk q carrsoln status',
   sigma_h: 'sd_h_m sigma_h_m hacc h_acc sd_h',
   sigma_v: 'sd_v_m sigma_v_m vacc v_acc sd_v sdu_m sigma_u_m',
   sigma_e: 'sde_m sigma_e_m',
   sigma_n: 'sdn_m sigma_n_m',
   age: 'correction_age_s age_s age',
-  satellites: 'satellites sats num_sv ns',
+  satellites: 'satellites sats num_sv ns nsats satellites_used',
   heading: 'heading_deg heading yaw_deg yaw',
   qx: 'qx',
   qy: 'qy',
@@ -81,8 +98,27 @@ function guessed(t: Table, fields: readonly Field[]): Columns {
   }
   return out;
 }
-export const guessed_track = (t: Table): Columns =>
-  guessed(t, [...TRACK_FIELDS, 'sigma_e', 'sigma_n', 'age', 'satellites', 'heading', 'qx', 'qy', 'qz', 'qw']);
+export function guessed_track(t: Table): Columns {
+  const { lat, lon, height, ...rest } = guessed(t, [
+    ...TRACK_FIELDS,
+    'sigma_e',
+    'sigma_n',
+    'age',
+    'satellites',
+    'heading',
+    'qx',
+    'qy',
+    'qz',
+    'qw',
+  ]);
+  // Easting and northing have a height beside them; so have columns called latitude and longitude that hold metres.
+  if (lat && lon && !(height && degrees_kind(t, lat, lon) === 'no_degrees'))
+    return { ...rest, lat, lon, ...(height ? { height } : {}) };
+  if (lat && lon) return { ...rest, x: lon, y: lat, z: height! };
+  return rest.x && rest.y && !rest.z && height
+    ? { ...rest, z: height }
+    : { ...rest, ...(lat ? { lat } : {}), ...(lon ? { lon } : {}), ...(height ? { height } : {}) };
+}
 export const guessed_ranges = (t: Table): Columns => guessed(t, [...RANGE_FIELDS, 'antenna', 'kind']);
 export const missing_track = (c: Columns): readonly Field[] => {
   const globe = (['lat', 'lon', 'height'] as const).filter((f) => !c[f]),

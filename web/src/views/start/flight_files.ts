@@ -2,6 +2,7 @@
 import type { Wire } from '../../api/contract';
 import { num, obj, str } from '../../live/messages';
 import { is_local, missing_ranges, missing_track, type Columns, type Field } from './fields';
+import { height_unit_of, heights_of, MOST_LOCAL_M, place_kind, type Heights } from './places';
 import { number_of, type Table } from './table_file';
 import {
   address_of,
@@ -31,6 +32,8 @@ export interface Declared {
   readonly about: Partial<About>;
   readonly tags: NonNullable<Wire<'MissionCreate'>['tags']> | null;
   readonly heading: { readonly column: string; readonly add_deg: number } | null;
+  readonly crs?: string; ///< of frame crs
+  readonly heights?: string;
 }
 /// flight.json, as far as it goes.
 export function declared_of(text: string): Declared {
@@ -66,6 +69,8 @@ export function declared_of(text: string): Declared {
           add_deg: num(obj(track?.heading_enu_ccw_from_east_deg)?.add) ?? 0,
         }
       : null,
+    ...(str(track?.crs) ? { crs: str(track?.crs) } : {}),
+    ...(str(track?.heights) ? { heights: str(track?.heights) } : {}),
   };
 }
 
@@ -75,19 +80,45 @@ export interface Reading {
   readonly range_time: TimeReading;
   readonly range: LengthUnit;
   readonly fix: FixNumbers | 'words' | null; ///< null: a person has to say it
+  readonly crs: string | null; ///< of x, y, z, as the server reads it; empty: a frame of their own, or degrees
+  readonly heights: Heights | null;
+  readonly height: LengthUnit;
 }
-export const guessed_reading = (
+export function guessed_reading(
   track: Table,
   tc: Columns,
   ranges: Table,
   rc: Columns,
   declared: Declared | null,
-): Reading => ({
-  track_time: time_reading(track, tc.time),
-  range_time: time_reading(ranges, rc.time),
-  range: range_unit(ranges, rc.range),
-  fix: tc.fix === undefined ? 'words' : fix_numbers(track, tc.fix, declared !== null),
-});
+): Reading {
+  const kind = place_kind(track, tc);
+  return {
+    track_time: time_reading(track, tc.time),
+    range_time: time_reading(ranges, rc.time),
+    range: range_unit(ranges, rc.range),
+    fix: tc.fix === undefined ? 'words' : fix_numbers(track, tc.fix, declared !== null),
+    crs: declared?.crs ?? (kind === 'map' ? null : kind === 'ecef' ? 'ECEF' : ''),
+    // Those of a flight folder are ellipsoidal.
+    heights: declared ? (declared.heights ?? 'ellipsoidal') : heights_of(track, tc),
+    height: height_unit_of(track, tc, kind),
+  };
+}
+/// What a person has to say before a flight can be read: fields without a column, and what no name shows.
+export type Need = Field | 'time of the ranges' | 'tag address' | 'fix numbers' | 'degrees' | 'crs' | 'heights';
+export function needs_of(track: Table, tc: Columns, rc: Columns, reading: Reading, tag: string): readonly Need[] {
+  return [
+    ...missing_track(tc),
+    ...missing_ranges(rc).map((f) => (f === 'time' ? 'time of the ranges' : f)),
+    ...(rc.tag || tag ? [] : (['tag address'] as const)),
+    ...(reading.fix === null ? (['fix numbers'] as const) : []),
+    ...(place_kind(track, tc) === 'no_degrees' ? (['degrees'] as const) : []),
+    ...(reading.crs === null ? (['crs'] as const) : []),
+    ...(heights_matter(tc, reading.crs) && reading.heights === null ? (['heights'] as const) : []),
+  ];
+}
+/// Whether the heights are above something that has to be known: those of a local frame and of ECEF are not.
+export const heights_matter = (tc: Columns, crs: string | null): boolean =>
+  is_local(tc) ? crs !== '' && crs?.toUpperCase() !== 'ECEF' : true;
 
 const cell_at = (t: Table, c: Columns, f: Field): ((row: readonly string[]) => string) => {
   const at = c[f] === undefined ? -1 : t.columns.indexOf(c[f]);
@@ -129,11 +160,27 @@ export function overlap_of(
 
 export interface Flight {
   readonly mission: Wire<'MissionCreate'>;
-  readonly fixes: readonly object[];
+  readonly fixes: readonly Position[];
   readonly ranges: readonly object[];
   readonly names: ReadonlyMap<string, string>; ///< of anchors that the files call by a name, by their address
   readonly refused: readonly string[]; ///< rows that are no numbers, in words
   readonly unknown_fix: ReadonlyMap<string, number>; ///< fix classes that say nothing, and how many positions have them
+  readonly source: Source | null;
+}
+/// A position as the API has it; of a flight with a source its place is still in that system.
+export interface Position {
+  readonly t_us: number;
+  readonly lon?: number;
+  readonly lat?: number;
+  readonly h_m?: number;
+  readonly local_m?: readonly number[];
+}
+export const place_of = ({ local_m, lon, lat, h_m }: Position): readonly [number, number, number] =>
+  (local_m ?? [lon, lat, h_m]) as unknown as readonly [number, number, number];
+/// The system that the places of a flight's positions are in, where the server has to make WGS84 of them.
+export interface Source {
+  readonly crs: string;
+  readonly heights: string;
 }
 
 export function flight_of(
@@ -148,6 +195,9 @@ export function flight_of(
   const missing = [...missing_track(tc), ...missing_ranges(rc)];
   if (missing.length) throw new Error(`no column is chosen for ${missing.join(', ')}`);
   if (reading.fix === null) throw new Error('what the numbers of the fix class mean is not chosen');
+  if (reading.crs === null) throw new Error('the coordinate system of x, y, z is not chosen');
+  if (heights_matter(tc, reading.crs) && reading.heights === null)
+    throw new Error('above what the heights are is not chosen');
   const refused: string[] = [],
     unknown_fix = new Map<string, number>(),
     names = new Map<string, string>(),
@@ -160,7 +210,7 @@ export function flight_of(
     mission: {
       name: about.name || 'Imported flight',
       ...(about.kit ? { kit: about.kit } : {}),
-      frame: is_local(tc) ? 'local' : 'wgs84',
+      frame: is_local(tc) && reading.crs === '' ? 'local' : 'wgs84',
       track_point: about.point,
       ...(about.lever_arm_sigma_m === null ? {} : { lever_arm_sigma_m: about.lever_arm_sigma_m }),
       take_devices: false,
@@ -173,7 +223,14 @@ export function flight_of(
     names,
     refused,
     unknown_fix,
+    source: source_of(tc, reading),
   };
+}
+function source_of(tc: Columns, { crs, heights }: Reading): Source | null {
+  // A column of separations is added here.
+  const above = !heights_matter(tc, crs) || !heights || heights === 'column' ? 'ellipsoidal' : heights;
+  if (is_local(tc)) return crs ? { crs, heights: above } : null;
+  return above === 'ellipsoidal' ? null : { crs: 'EPSG:4326', heights: above };
 }
 
 function fixes_of(
@@ -184,7 +241,7 @@ function fixes_of(
   declared: Declared | null,
   refused: string[],
   unknown_fix: Map<string, number>,
-): { t_us: number }[] {
+): Position[] {
   const numbers = reading.fix ?? 'words',
     local = is_local(c),
     text = (f: Field) => cell_at(t, c, f),
@@ -194,6 +251,24 @@ function fixes_of(
     },
     time = text('time'),
     place = (local ? (['x', 'y', 'z'] as const) : (['lon', 'lat', 'height'] as const)).map(value),
+    own_frame = local && reading.crs === '',
+    per_degree = place_kind(t, c) === 'degrees_1e7' ? 1e7 : 1,
+    separation = reading.heights === 'column' && heights_matter(c, reading.crs) ? value('separation') : () => 0,
+    at_of = (row: readonly string[]): readonly [number, number, number] | null => {
+      const [x, y, z] = place.map((p) => p(row)),
+        geoid = separation(row);
+      if (x == null || y == null || z == null || geoid === null) return null;
+      return [x / (local ? 1 : per_degree), y / (local ? 1 : per_degree), z / PER_METRE[reading.height] + geoid];
+    },
+    /// What can be no place of this kind; looked at in each row, for the first ones may look otherwise.
+    wrong_place = (at: readonly [number, number, number] | null): string => {
+      // Both zero is what a receiver without a fix writes.
+      if (at === null || (at[0] === 0 && at[1] === 0 && !own_frame)) return 'no place';
+      if (!local) return Math.abs(at[0]) > 180 || Math.abs(at[1]) > 90 ? 'latitude or longitude is no degrees' : '';
+      return own_frame && at.some((v) => Math.abs(v) > MOST_LOCAL_M)
+        ? 'x, y, z are more than 100 km from zero: a coordinate system is needed'
+        : '';
+    },
     fix = text('fix'),
     [h, v, e, n] = (['sigma_h', 'sigma_v', 'sigma_e', 'sigma_n'] as const).map(value),
     q = (['qx', 'qy', 'qz', 'qw'] as const).map(value),
@@ -213,11 +288,12 @@ function fixes_of(
   };
   return t.rows.flatMap((row, i) => {
     const t_us = time_us(time(row), reading.track_time, t.decimal, about.epoch_ms),
-      at = place.map((p) => p(row));
-    if (!Number.isFinite(t_us) || at.some((p) => p === null)) {
-      refused.push(
-        `${t.name} row ${i + 2}: ${Number.isFinite(t_us) ? 'no place' : `"${time(row)}" is no time that is known (2026-05-04 10:00:01.5)`}`,
-      );
+      at = at_of(row),
+      wrong = Number.isFinite(t_us)
+        ? wrong_place(at)
+        : `"${time(row)}" is no time that is known (2026-05-04 10:00:01.5)`;
+    if (at === null || wrong) {
+      refused.push(`${t.name} row ${i + 2}: ${wrong}`);
       return [];
     }
     const up = v!(row),

@@ -89,7 +89,7 @@ export function Import() {
         <h1>Import a flight</h1>
         <p class="lead">
           A flight folder (flight.json, track.csv, ranges.csv), the two tables alone as a logger wrote them, or either
-          as .zip. The track may be a .pos file of RTKLIB. Nothing leaves this server.
+          as .zip. The track may be a .pos file of RTKLIB, and its positions of a map. Nothing leaves this server.
         </p>
         {!found && (
           <div

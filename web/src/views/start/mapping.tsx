@@ -2,7 +2,7 @@
 /// change where they do.
 import { useMemo, useState } from 'preact/hooks';
 import { error_text } from '../../api/client';
-import { send_flight } from '../../api/imports';
+import { on_globe, send_flight } from '../../api/imports';
 import { load_missions } from '../../state/archive';
 import { chosen_mission, say } from '../../state/store';
 import { fixed, grouped } from '../../ui/format';
@@ -21,12 +21,17 @@ import {
 import {
   flight_of,
   guessed_reading,
+  heights_matter,
+  needs_of,
   overlap_of,
+  place_of,
   type About,
   type Declared,
+  type Flight,
   type Overlap,
   type Reading,
 } from './flight_files';
+import { HEIGHT_WORDS, place_kind } from './places';
 import { anchor_columns, sample_of, with_a_row_for_each_range, type Table } from './table_file';
 import { FIX_NUMBERS, LENGTH_UNITS, TIME_UNITS, type TimeReading } from './values';
 
@@ -36,7 +41,19 @@ export interface Found {
   readonly declared: Declared | null;
   readonly name: string;
 }
-const field_words = (f: Field): string => FIELD_WORDS[f as keyof typeof FIELD_WORDS].toLowerCase();
+const field_words = (f: Field | 'time of the ranges'): string =>
+  f === 'time of the ranges'
+    ? 'the time of the ranges'
+    : f === 'time'
+      ? 'the time of the track'
+      : FIELD_WORDS[f as keyof typeof FIELD_WORDS].toLowerCase();
+const NEED_WORDS = {
+  'tag address': 'the tag',
+  'fix numbers': 'what the numbers of the fix class mean',
+  degrees: 'latitude and longitude in degrees, or x and y of a map',
+  crs: 'the coordinate system of x, y, z',
+  heights: 'what the heights are above',
+};
 const MOST_ANCHORS = 64; ///< columns; a table of more numbers is none of one column for each anchor
 
 export function Mapping({ found, back }: { found: Found; back: () => void }) {
@@ -63,16 +80,13 @@ export function Mapping({ found, back }: { found: Found; back: () => void }) {
       () => ({ ...guessed_reading(track, tc, ranges, rc, declared), ...said }),
       [track, tc, ranges, rc, declared, said],
     ),
-    needed = [
-      ...missing_track(tc).map((f) => (f === 'time' ? 'the time of the track' : field_words(f))),
-      ...missing_ranges(rc).map((f) => (f === 'time' ? 'the time of the ranges' : field_words(f))),
-    ],
-    complete = needed.length === 0,
-    missing = [
-      ...needed,
-      ...(!rc.tag && !about.tag ? ['the tag'] : []),
-      ...(reading.fix === null ? ['what the numbers of the fix class mean'] : []),
-    ],
+    kind = useMemo(() => place_kind(track, tc), [track, tc]),
+    above_something = heights_matter(tc, reading.crs),
+    needs = needs_of(track, tc, rc, reading, about.tag),
+    complete = !needs.some((n) => !(n in NEED_WORDS)),
+    missing = needs.map(
+      (n) => NEED_WORDS[n as keyof typeof NEED_WORDS] ?? field_words(n as Field | 'time of the ranges'),
+    ),
     overlap = useMemo(
       () => (complete ? overlap_of(track, tc, ranges, rc, reading, about.epoch_ms) : null),
       [complete, track, tc, ranges, rc, reading, about.epoch_ms],
@@ -88,7 +102,8 @@ export function Mapping({ found, back }: { found: Found; back: () => void }) {
       if (!flight.fixes.length || !flight.ranges.length)
         throw new Error(flight.refused[0] ?? 'There is not one position and one range in it.');
       set_share(0);
-      const sent = await send_flight(flight.mission, flight.fixes, flight.ranges, flight.names, set_share);
+      const [fixes, moved] = await placed(flight);
+      const sent = await send_flight(flight.mission, fixes, flight.ranges, flight.names, set_share);
       await load_missions();
       chosen_mission.value = sent.mission;
       const not = sent.rejected + flight.refused.length,
@@ -96,6 +111,7 @@ export function Mapping({ found, back }: { found: Found; back: () => void }) {
       say(
         [
           `${grouped(sent.accepted)} rows are in`,
+          moved,
           not ? `${grouped(not)} rejected (first: ${flight.refused[0] ?? sent.first_reason})` : '',
           odd
             ? `${grouped(odd[1])} positions have the fix class "${odd[0]}", which is not known: they count as no fix`
@@ -195,7 +211,52 @@ export function Mapping({ found, back }: { found: Found; back: () => void }) {
           />
         )}
       </div>
-      {tc.fix === undefined && !is_local(tc) && (
+      <div class="fields">
+        {is_local(tc) && (
+          <label>
+            <span class="lab">Coordinate system of x, y, z</span>
+            <input
+              value={reading.crs ?? ''}
+              placeholder={kind === 'map' ? 'EPSG:25832, UTM 32N' : 'a local frame'}
+              aria-invalid={reading.crs === null}
+              data-testid="import-crs"
+              onInput={(e) => {
+                const crs = e.currentTarget.value.trim();
+                set_said({ ...said, crs: crs === '' && kind !== 'local' ? null : crs });
+              }}
+            />
+          </label>
+        )}
+        {above_something && (
+          <HeightsField
+            value={reading.heights}
+            has_column={tc.separation !== undefined}
+            set={(heights) => set_said({ ...said, heights })}
+          />
+        )}
+        {above_something && (
+          <Choice
+            label="Heights are in"
+            id="height-unit"
+            value={reading.height}
+            words={LENGTH_UNITS}
+            set={(height) => set_said({ ...said, height })}
+          />
+        )}
+      </div>
+      {kind === 'map' && !reading.crs && (
+        <p class="caution" data-testid="import-map">
+          x, y, z are more than 100 km from zero: coordinates of a map or a national grid. Name its EPSG code or zone;
+          the server makes longitude and latitude of them.
+        </p>
+      )}
+      {above_something && reading.heights === null && (
+        <p class="caution" data-testid="import-heights">
+          Nothing says what the heights are above. Anchors get heights above the ellipsoid; sea level is up to 100 m
+          away from it.
+        </p>
+      )}
+      {tc.fix === undefined && !(is_local(tc) && reading.crs === '') && (
         <p class="caution" data-testid="import-all-fixed">
           No column says the fix class: every position counts as RTK fixed. If some were float or single, anchors are
           wrong and nothing shows it.
@@ -294,6 +355,60 @@ export function Mapping({ found, back }: { found: Found; back: () => void }) {
         </button>
       </div>
     </form>
+  );
+}
+
+/// The positions as the server takes them, and what was done to them, in words.
+async function placed({ fixes, source }: Flight): Promise<readonly [readonly object[], string]> {
+  if (!source) return [fixes, ''];
+  const { places, what } = await on_globe(fixes.map(place_of), source);
+  return [
+    fixes.map((f, i) => {
+      const { local_m: _, ...rest } = f,
+        [lon, lat, h_m] = places[i]!;
+      return { ...rest, lon, lat, h_m };
+    }),
+    what,
+  ];
+}
+
+/// Above what heights are: one of those that are usual, or as the server reads it.
+function HeightsField({
+  value,
+  has_column,
+  set,
+}: {
+  value: string | null;
+  has_column: boolean;
+  set: (heights: string | null) => void;
+}) {
+  const { column: _, ...others } = HEIGHT_WORDS,
+    words = has_column ? HEIGHT_WORDS : others,
+    [other, set_other] = useState(value !== null && !(value in HEIGHT_WORDS));
+  return (
+    <>
+      <Choice
+        label="Heights are above"
+        id="import-heights-above"
+        value={other ? 'other' : (value as keyof typeof HEIGHT_WORDS | null)}
+        words={words as typeof HEIGHT_WORDS}
+        set={(w) => {
+          set_other(w === 'other');
+          set(w === 'other' ? null : w);
+        }}
+      />
+      {other && (
+        <label>
+          <span class="lab">EPSG code of the heights, or height of the geoid there, m</span>
+          <input
+            value={value ?? ''}
+            placeholder="EPSG:7837, 47.3"
+            data-testid="import-heights-other"
+            onInput={(e) => set(e.currentTarget.value.trim().replace(',', '.') || null)}
+          />
+        </label>
+      )}
+    </>
   );
 }
 

@@ -6,6 +6,7 @@ export interface Table {
   readonly columns: readonly string[];
   readonly rows: readonly (readonly string[])[];
   readonly decimal: '.' | ',';
+  readonly heights?: 'ellipsoidal'; ///< where the file says it
 }
 const MAX_ROWS = 2_000_000;
 const SAMPLE = 200; ///< rows that show how a column is written
@@ -22,19 +23,24 @@ export function decoded(bytes: Uint8Array): string {
   }
 }
 
-/// Positions of RTKLIB: the last line of the heading has the names, blanks stand between columns, a moment is a date and a time of day.
-function of_rtklib(text: string): { columns: string[]; cells: string[][] } | null {
+/// Positions of RTKLIB: the last line of the heading has the names, blanks stand between columns, a moment is a date and a time of day, or a week
+/// and its seconds. The heading says above what heights are: ellipsoidal, or geodetic for a geoid that it does not name.
+function of_rtklib(text: string): { columns: string[]; cells: string[][]; ellipsoidal: boolean } | null {
   const lines = text.split(/\r?\n/).filter((l) => l.trim() !== ''),
     heading = lines.filter((l) => l.startsWith('%')),
     names = heading[heading.length - 1]?.slice(1).trim().split(/\s+/) ?? [];
   if (!/^(GPST|UTC|JST)$/.test(names[0] ?? '')) return null;
+  if (names.some((n) => n.includes("(d'")))
+    throw new Error(
+      'positions in degrees, minutes and seconds: write them in decimal degrees (out-outsolformat llh, out-degform deg)',
+    );
   const cells = lines
     .filter((l) => !l.startsWith('%'))
     .map((l) => {
       const [day, clock, ...rest] = l.trim().split(/\s+/);
       return [`${day} ${clock}`, ...rest];
     });
-  return { columns: names, cells };
+  return { columns: names, cells, ellipsoidal: heading.some((l) => /=\w+\/ellipsoidal/.test(l)) };
 }
 
 /// A decimal comma differs from a comma between two numbers by the separator: a comma that separates columns is none.
@@ -73,7 +79,7 @@ export function table_of(name: string, text: string): Table {
     if (row.length !== columns.length)
       throw new Error(`${name} row ${i + 2}: ${row.length} cells, the header has ${columns.length}`);
   });
-  return { name, columns, rows, decimal };
+  return { name, columns, rows, decimal, ...(rtklib?.ellipsoidal ? { heights: 'ellipsoidal' as const } : {}) };
 }
 
 /// NaN where it is none; also for nothing at all.
@@ -84,6 +90,22 @@ export function number_of(cell: string, decimal: '.' | ','): number {
 /// A column's first values, as they show what it is.
 export const sample_of = (t: Table, column: string | undefined): readonly string[] =>
   column === undefined ? [] : t.rows.slice(0, SAMPLE).map((r) => r[t.columns.indexOf(column)] ?? '');
+/// The numbers among them.
+export const numbers_of = (t: Table, column: string | undefined): readonly number[] =>
+  sample_of(t, column)
+    .map((x) => number_of(x, t.decimal))
+    .filter(Number.isFinite);
+export const beyond = (values: readonly number[], most: number): boolean => values.some((v) => Math.abs(v) > most);
+/// What columns of latitude and longitude hold: degrees, whole numbers of 1e-7 degrees, or something else.
+export type DegreesKind = 'degrees' | 'degrees_1e7' | 'no_degrees';
+export function degrees_kind(t: Table, lat: string, lon: string): DegreesKind {
+  const [la, lo] = [numbers_of(t, lat), numbers_of(t, lon)];
+  if (!beyond(la, 90) && !beyond(lo, 180)) return 'degrees';
+  // Autopilots write whole numbers of 1e-7 degrees; a northing is below 1e7 m.
+  const whole = [...la, ...lo].every(Number.isInteger) && (beyond(la, 1e7) || beyond(lo, 1e7));
+  return whole && !beyond(la, 90e7) && !beyond(lo, 180e7) ? 'degrees_1e7' : 'no_degrees';
+}
+
 /// All values of a column that occur, few or many.
 export function values_of(t: Table, column: string): ReadonlySet<string> {
   const at = t.columns.indexOf(column),

@@ -18,6 +18,9 @@ export const TIME_UNITS: Record<TimeUnit, string> = {
 };
 export type LengthUnit = 'm' | 'cm' | 'mm';
 export const LENGTH_UNITS: Record<LengthUnit, string> = { m: 'metres', cm: 'centimetres', mm: 'millimetres' };
+/// By the ending of a column's name.
+export const unit_of_name = (column: string | undefined): LengthUnit | undefined =>
+  /_(m|cm|mm)$/.exec(plain(column ?? ''))?.[1] as LengthUnit | undefined;
 export const PER_METRE: Record<LengthUnit, number> = { m: 1, cm: 100, mm: 1000 };
 
 /// By the name of the column, else by how its first value looks.
@@ -26,12 +29,12 @@ export function time_reading(t: Table, column: string | undefined): TimeReading 
     first = sample_of(t, column)[0] ?? '',
     v = number_of(first, t.decimal),
     scale: TimeScale = /(^|_)gps(t|_|$)/.test(name) ? 'gps' : 'utc',
-    ending = /_(s|ms|us|ns)$/.exec(name)?.[1] as TimeUnit | undefined;
+    ending = /_(s|ms|us|ns)$/.exec(name.replace(/_usec$/, '_us'))?.[1] as TimeUnit | undefined;
   if (/[:/]/.test(first)) return { unit: 'date', scale };
   return { unit: ending ?? (v > 1e17 ? 'ns' : v > 1e14 ? 'us' : v > 1e11 ? 'ms' : 's'), scale };
 }
 export function range_unit(t: Table, column: string | undefined): LengthUnit {
-  const ending = /_(m|cm|mm)$/.exec(plain(column ?? ''))?.[1] as LengthUnit | undefined,
+  const ending = unit_of_name(column),
     values = sample_of(t, column).map((x) => number_of(x, t.decimal));
   return ending ?? (values.filter((v) => v > 400).length > values.length / 2 ? 'mm' : 'm');
 }
@@ -60,8 +63,14 @@ function date_us(text: string): number {
   if (new Date(ms).getUTCDate() !== Number(d)) return NaN;
   return ms * 1000 + Math.round(Number(`0.${fraction || 0}`) * 1e6) - zone_min * 60e6;
 }
-/// Microseconds since 1970 UTC; NaN where it is no moment. `epoch_ms`: of a flight whose times count from its beginning.
+/// Microseconds since 1970 UTC; NaN where it is no moment. A week and its seconds are of GPS, whatever else is said.
+/// `epoch_ms`: of a flight whose times count from its beginning.
 export function time_us(cell: string, { unit, scale }: TimeReading, decimal: '.' | ',', epoch_ms: number): number {
+  const of_week = /^(\d{3,4}) +(\d+(?:\.\d*)?)$/.exec(cell);
+  if (of_week) {
+    const us = GPS_EPOCH_US + Math.round((Number(of_week[1]) * 604800 + Number(of_week[2])) * 1e6);
+    return us - leaps_us(us);
+  }
   if (unit === 'date') {
     const us = date_us(cell),
       gps = /GPST$/i.test(cell) || (scale === 'gps' && !/(Z|UTC|[+-]\d\d:?\d\d)$/i.test(cell));

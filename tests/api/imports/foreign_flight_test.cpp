@@ -1,0 +1,187 @@
+// Tables of other programs: the cases of tests/data/import, which the dashboard's reader runs too.
+#include "api/formats/foreign_flight.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <fstream>
+#include <iterator>
+#include <nlohmann/json.hpp>
+
+#include "api/wire/row_limits.hpp"
+#include "core/base/base64.hpp"
+#include "tests/paths.hpp"
+
+namespace anchord::api {
+namespace {
+
+using Json = nlohmann::json;
+
+Json file(const std::string& name) {
+  std::ifstream in(std::string(ANCHORD_TEST_DATA "/import/") + name);
+  return Json::parse(in);
+}
+
+ForeignOptions said_of(const Json& one) {
+  ForeignOptions out;
+  out.tag = "0x6e01";
+  if (!one.contains("said")) return out;
+  const Json& said = one["said"];
+  out.tag = said.value("tag", out.tag);
+  if (said.contains("crs")) out.crs = said["crs"];
+  if (said.contains("heights")) out.heights = said["heights"];
+  if (said.contains("fix_numbers"))
+    out.fix_numbers = k_fix_numbers_words.find(said["fix_numbers"].get<std::string>());
+  if (said.contains("track_time_scale"))
+    out.track_time_scale = k_time_scale_words.find(said["track_time_scale"].get<std::string>());
+  if (said.contains("epoch_utc"))
+    out.epoch_us = parse_rfc3339(said["epoch_utc"].get<std::string>()).value().us();
+  for (const auto& [key, columns] :
+       {std::pair{"track_columns", &out.track_columns}, std::pair{"range_columns", &out.range_columns}}) {
+    const Json named = said.value(key, Json::object());
+    for (const auto& [field, column] : named.items()) (*columns)[field] = column.get<std::string>();
+  }
+  return out;
+}
+
+void expect_fix(const Fix& fix, const Json& wanted) {
+  EXPECT_EQ(fix.time.us(), wanted["t_us"].get<std::int64_t>());
+  EXPECT_EQ(fix.seq, wanted["seq"].get<std::uint64_t>());
+  EXPECT_EQ(k_fix_words.word(fix.fix), wanted["fix"].get<std::string>());
+  const Eigen::Vector3d place =
+      fix.frame == TrackFrame::wgs84
+          ? Eigen::Vector3d(fix.position.lon_deg, fix.position.lat_deg, fix.position.height_m)
+          : fix.local_m;
+  for (int i = 0; i < 3; ++i)
+    EXPECT_NEAR(place[i], wanted["place"][static_cast<std::size_t>(i)].get<double>(), 1e-9);
+  ASSERT_EQ(fix.covariance_m2.has_value(), wanted.contains("sigma_m"));
+  for (int i = 0; fix.covariance_m2 && i < 3; ++i)
+    EXPECT_NEAR(std::sqrt((*fix.covariance_m2)(i, i)),
+                wanted["sigma_m"][static_cast<std::size_t>(i)].get<double>(), 1e-12);
+  ASSERT_EQ(fix.enu_from_body.has_value(), wanted.contains("heading_deg"));
+  if (fix.enu_from_body) {
+    EXPECT_LT(fix.enu_from_body->angularDistance(row_limits::rotation_of_heading(wanted["heading_deg"])),
+              1e-9);
+  }
+  EXPECT_EQ(fix.correction_age_s.has_value(), wanted.contains("correction_age_s"));
+  EXPECT_EQ(fix.satellites.has_value(), wanted.contains("satellites"));
+  if (fix.correction_age_s) {
+    EXPECT_EQ(*fix.correction_age_s, wanted["correction_age_s"].get<double>());
+  }
+  if (fix.satellites) {
+    EXPECT_EQ(*fix.satellites, wanted["satellites"].get<int>());
+  }
+}
+
+void expect_range(const Range& range, const Json& wanted) {
+  EXPECT_EQ(range.time.us(), wanted["t_us"].get<std::int64_t>());
+  EXPECT_EQ(range.seq, wanted["seq"].get<std::uint64_t>());
+  EXPECT_EQ(range.tag.value, wanted["tag"].get<std::uint32_t>());
+  EXPECT_EQ(range.anchor.value, wanted["anchor"].get<std::uint32_t>());
+  EXPECT_NEAR(range.distance_m, wanted["distance_m"].get<double>(), 1e-9);
+  ASSERT_EQ(range.rss_dbm.has_value(), wanted.contains("rss_dbm"));
+  if (range.rss_dbm) {
+    EXPECT_EQ(*range.rss_dbm, wanted["rss_dbm"].get<double>());
+  }
+}
+
+void expect_source(const std::optional<SourceCrsSpec>& source, const Json& one) {
+  ASSERT_EQ(source.has_value(), one.contains("source"));
+  if (!source) return;
+  SourceCrsSpec wanted;
+  ASSERT_TRUE(read_heights(one["source"]["heights"].get<std::string>(), wanted));
+  EXPECT_EQ(source->crs, one["source"]["crs"].get<std::string>());
+  EXPECT_EQ(source->height_epsg, wanted.height_epsg);
+  EXPECT_EQ(source->separation_m, wanted.separation_m);
+}
+
+/// The whole of a case; the message of what went wrong is returned.
+std::string run(const Json& one) {
+  const std::string bytes = one.contains("track_base64")
+                                ? from_base64(one["track_base64"].get<std::string>()).value()
+                                : one["track"].get<std::string>();
+  const auto track = ForeignTable::parse("track", bytes);
+  if (!track) return track.error().message;
+  auto ranges = ForeignTable::parse("ranges", one["ranges"].get<std::string>());
+  if (!ranges) return ranges.error().message;
+  ForeignTable table = std::move(ranges).value();
+  if (one.value("column_for_each_anchor", false)) {
+    std::vector<std::string> claimed;
+    for (const auto& [field, column] : guessed_range_columns(table)) claimed.push_back(column);
+    table = std::move(table).with_a_row_for_each_range(table.number_columns(claimed));
+  }
+  const auto options = said_of(one);
+  EXPECT_EQ(Json(foreign_needs(track.value(), table, options)), one.value("needs", Json::array()));
+  const auto read = foreign_flight(track.value(), table, options);
+  if (!read) return one.contains("needs") ? "" : read.error().message;
+  EXPECT_FALSE(one.contains("needs")) << "taken without what has to be said";
+  const auto& flight = read.value();
+  EXPECT_EQ(flight.data.fixes.size(), one["fixes"].size());
+  for (std::size_t i = 0; i < std::min(flight.data.fixes.size(), one["fixes"].size()); ++i)
+    expect_fix(flight.data.fixes[i], one["fixes"][i]);
+  EXPECT_EQ(flight.data.ranges.size(), one["ranges_read"].size());
+  for (std::size_t i = 0; i < std::min(flight.data.ranges.size(), one["ranges_read"].size()); ++i)
+    expect_range(flight.data.ranges[i], one["ranges_read"][i]);
+  EXPECT_EQ(Json(flight.refused), one.value("refused", Json::array()));
+  EXPECT_EQ(Json(flight.unknown_fix), one.value("unknown_fix", Json::object()));
+  expect_source(flight.source, one);
+  return "";
+}
+
+TEST(ForeignFlight, ReadsEveryCaseAsTheDashboardDoes) {
+  for (const auto& one : file("cases.json")) {
+    SCOPED_TRACE(one["name"].get<std::string>());
+    const auto why = run(one);
+    if (one.contains("error"))
+      EXPECT_NE(why.find(one["error"].get<std::string>()), std::string::npos) << why;
+    else
+      EXPECT_EQ(why, "");
+  }
+}
+
+TEST(ForeignFlight, KnowsTheColumnsThatTheDashboardKnows) {
+  Json own = Json::object();
+  for (const auto& known : k_foreign_fields) {
+    Json& names = own[std::string(known.field)] = Json::array();
+    for (std::string_view rest = known.names; !rest.empty();) {
+      const auto end = rest.find(' ');
+      names.push_back(std::string(rest.substr(0, end)));
+      rest.remove_prefix(end == std::string_view::npos ? rest.size() : end + 1);
+    }
+  }
+  EXPECT_EQ(own, file("columns.json"));
+}
+
+TEST(ForeignFlight, PutsATrackOfAMapOnTheGlobeAndSaysSo) {
+  auto track = ForeignTable::parse(
+      "track", "time_s,E,N,alt_msl,fix\n1777888801.5,691650.366852,5334754.246451,520,fixed\n");
+  auto ranges = ForeignTable::parse("ranges", "time_s,anchor,range_m\n1777888801.5,0x6a21,7.4\n");
+  ASSERT_TRUE(track && ranges);
+  ForeignOptions options;
+  options.tag = "0x6e01";
+  options.crs = "EPSG:25832";
+  options.heights = "45.25";
+  options.lever_arm_body_m = {0.1, 0, -0.2};
+  const auto flight = read_foreign_flight(std::move(track).value(), std::move(ranges).value(), options);
+  ASSERT_TRUE(flight) << flight.error().message;
+  // gdaltransform -s_srs EPSG:4979 -t_srs EPSG:25832 of 11.576124 48.137154.
+  const auto& fix = flight.value().fixes.at(0);
+  EXPECT_NEAR(fix.position.lon_deg, 11.576124, 1e-8);
+  EXPECT_NEAR(fix.position.lat_deg, 48.137154, 1e-8);
+  EXPECT_NEAR(fix.position.height_m, 565.25, 1e-6);
+  EXPECT_EQ(flight.value().mission.frame, TrackFrame::wgs84);
+  EXPECT_EQ(flight.value().mission.tags.at(0).lever_arm_body_m.z(), -0.2);
+  EXPECT_NE(Json(flight.value().notes).dump().find("ETRS89 / UTM zone 32N to ETRS89"), std::string::npos);
+}
+
+TEST(ForeignFlight, NamesTheOptionThatSaysWhatIsNotKnown) {
+  auto track = ForeignTable::parse("t.csv", "time,lat,lon,alt,fix\n1777888801.5,51,3.7,55,1\n");
+  auto ranges = ForeignTable::parse("r.csv", "time,who,range_m\n1777888801.5,0x6a21,7.4\n");
+  const auto flight = read_foreign_flight(std::move(track).value(), std::move(ranges).value(), {});
+  ASSERT_FALSE(flight);
+  for (const char* option : {"--column ranges.anchor=NAME", "--tag", "--fix-numbers", "--heights"})
+    EXPECT_NE(flight.error().message.find(option), std::string::npos) << flight.error().message;
+}
+
+}  // namespace
+}  // namespace anchord::api

@@ -1,0 +1,114 @@
+import { readFileSync } from 'node:fs';
+import { expect, it } from 'vitest';
+import { guessed_ranges, guessed_track, NAMES, type Columns } from '../src/views/start/fields';
+import {
+  flight_of,
+  guessed_reading,
+  needs_of,
+  place_of,
+  type About,
+  type Reading,
+} from '../src/views/start/flight_files';
+import { anchor_columns, decoded, table_of, with_a_row_for_each_range } from '../src/views/start/table_file';
+
+/// Cases that the command line runs too, so that both read the same tables the same way.
+const file = (name: string): unknown =>
+  JSON.parse(readFileSync(new URL(`../../tests/data/import/${name}`, import.meta.url), 'utf8'));
+interface Said extends Partial<Omit<Reading, 'track_time' | 'range_time' | 'fix'>> {
+  readonly track_columns?: Columns;
+  readonly range_columns?: Columns;
+  readonly fix_numbers?: Reading['fix'];
+  readonly track_time_scale?: 'utc' | 'gps';
+  readonly epoch_utc?: string;
+  readonly tag?: string;
+}
+interface Case {
+  readonly name: string;
+  readonly track?: string;
+  readonly track_base64?: string;
+  readonly ranges: string;
+  readonly said?: Said;
+  readonly column_for_each_anchor?: boolean;
+  readonly needs?: readonly string[];
+  readonly error?: string;
+  readonly source?: object;
+  readonly fixes?: readonly object[];
+  readonly ranges_read?: readonly object[];
+  readonly refused?: readonly string[];
+  readonly unknown_fix?: Readonly<Record<string, number>>;
+}
+
+function run(c: Case) {
+  const { track_columns, range_columns, fix_numbers, track_time_scale, epoch_utc, tag, ...said } = c.said ?? {},
+    bytes = c.track_base64 ? Buffer.from(c.track_base64, 'base64') : new TextEncoder().encode(c.track),
+    track = table_of('track', decoded(bytes)),
+    wide = table_of('ranges', c.ranges),
+    ranges = c.column_for_each_anchor
+      ? with_a_row_for_each_range(wide, anchor_columns(wide, Object.values(guessed_ranges(wide))))
+      : wide,
+    [tc, rc] = [
+      { ...guessed_track(track), ...track_columns },
+      { ...guessed_ranges(ranges), ...range_columns },
+    ],
+    guess = guessed_reading(track, tc, ranges, rc, null),
+    reading: Reading = {
+      ...guess,
+      ...said,
+      ...(fix_numbers ? { fix: fix_numbers } : {}),
+      track_time: { ...guess.track_time, ...(track_time_scale ? { scale: track_time_scale } : {}) },
+    },
+    about: About = {
+      name: '',
+      kit: '',
+      epoch_ms: epoch_utc ? Date.parse(epoch_utc) : 0,
+      point: 'gnss_antenna',
+      lever_arm_m: [0, 0, 0],
+      lever_arm_sigma_m: null,
+      tag: tag ?? '0x6e01',
+    };
+  return {
+    needs: needs_of(track, tc, rc, reading, about.tag),
+    flight: () => flight_of(track, tc, ranges, rc, reading, about, null),
+  };
+}
+
+it.each((file('cases.json') as readonly Case[]).map((c) => [c.name, c] as const))('reads %s', (_, c) => {
+  if (c.error !== undefined) {
+    expect(() => run(c)).toThrow(c.error);
+    return;
+  }
+  const { needs, flight } = run(c);
+  expect(needs).toEqual(c.needs ?? []);
+  if (c.needs) return;
+  const f = flight();
+  expect(
+    f.fixes.map((p) => {
+      const { lon: _lon, lat: _lat, h_m: _h, local_m: _local, ...rest } = p;
+      return { ...rest, place: place_of(p) };
+    }),
+  ).toEqual(c.fixes!.map((x) => expect.objectContaining(near(x)) as object));
+  expect(f.ranges).toEqual(
+    c.ranges_read!.map((r) => {
+      const { tag, anchor, ...rest } = r as { tag: number; anchor: number };
+      return {
+        ...rest,
+        tag: expect.toSatisfy((t: string) => Number(t) === tag) as string,
+        anchor: expect.toSatisfy((t: string) => Number(t) === anchor) as string,
+      };
+    }),
+  );
+  expect(f.refused).toEqual(c.refused ?? []);
+  expect(Object.fromEntries(f.unknown_fix)).toEqual(c.unknown_fix ?? {});
+  expect(f.source).toEqual(c.source ?? null);
+});
+/// Places to 1e-9 of a degree or of a metre: sums of two columns have a last bit.
+const near = (fix: object): object => ({
+  ...fix,
+  place: (fix as { place: readonly number[] }).place.map((v) => expect.closeTo(v, 9) as number),
+});
+
+it('knows the columns that the command line knows', () => {
+  expect(Object.fromEntries(Object.entries(NAMES).map(([f, names]) => [f, names.split(' ')]))).toEqual(
+    file('columns.json'),
+  );
+});
