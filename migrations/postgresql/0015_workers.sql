@@ -2,6 +2,10 @@
 ALTER TABLE job ADD COLUMN worker TEXT COLLATE "C" NOT NULL DEFAULT '';
 ALTER TABLE job ADD COLUMN attempts BIGINT NOT NULL DEFAULT 0;
 
+-- Nanoseconds since 1970 at this instant: not now(), which is when the transaction began.
+CREATE FUNCTION now_ns() RETURNS BIGINT LANGUAGE SQL VOLATILE AS
+  'SELECT CAST(extract(epoch FROM clock_timestamp()) * 1000000000 AS BIGINT)';
+
 -- Work of jobs that any process may do which has the database (docs/adr/0013). Times are of the database's clock.
 CREATE TABLE work (
   job_id BYTEA PRIMARY KEY REFERENCES job (id) ON DELETE CASCADE,
