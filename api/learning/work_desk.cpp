@@ -22,14 +22,14 @@ constexpr double k_alarm_s = 60;
 /// What is left to do with a result, of the whole.
 constexpr double k_share_of_work = 0.98;
 
-bool ended(const Job& job) { return job.state != JobState::queued && job.state != JobState::running; }
+bool job_ended(const Job& job) { return job.state != JobState::queued && job.state != JobState::running; }
 
 bool same(const Job& a, const Job& b) {
   return a.state == b.state && a.fraction == b.fraction && a.stage == b.stage && a.detail == b.detail &&
          a.worker == b.worker && a.attempts == b.attempts;
 }
 
-bool away(const Error& error) {
+bool store_away(const Error& error) {
   return error.code == Errc::storage_unavailable || error.code == Errc::storage_full ||
          error.code == Errc::queue_full;
 }
@@ -110,7 +110,7 @@ Result<void> WorkDesk::State::round() {
 Result<void> WorkDesk::State::follow(const WorkStatus& status) {
   BOOST_OUTCOME_TRY(const auto before, deps.job_store.job(status.job));
   // A server that was killed between the last two steps of a job.
-  if (ended(before)) return deps.work.remove(status.job, status.fence);
+  if (job_ended(before)) return deps.work.remove(status.job, status.fence);
   Job job = before;
   job.attempts = status.attempts;
   job.worker = status.worker;
@@ -141,7 +141,7 @@ Result<void> WorkDesk::State::conclude(const WorkStatus& status, Job job) {
     const auto ran = guarded("job", [&] { end = how->second(job.id, outcome.result); });
     if (!ran) end = make_error(Errc::internal, ran.what);
   }
-  if (!end && away(end.error())) return end.error();  // the result is kept: the next round takes it in
+  if (!end && store_away(end.error())) return end.error();  // the result is kept: the next round takes it in
   job.finished = deps.clock.now();
   if (end) {
     job.state = JobState::succeeded;
@@ -269,7 +269,7 @@ Result<Job> WorkDesk::restart(const JobId& id, std::string message) {
   auto& s = *state_;
   BOOST_OUTCOME_TRY(const auto before, s.deps.job_store.job(id));
   // What is left of its former life must not end the new one; while it lives, restart_elsewhere refuses.
-  if (ended(before)) {
+  if (job_ended(before)) {
     BOOST_OUTCOME_TRYV(s.deps.work.remove(id));
   }
   BOOST_OUTCOME_TRY(auto job, s.deps.jobs.restart_elsewhere(id));

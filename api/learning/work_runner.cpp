@@ -11,7 +11,7 @@ using Steady = std::chrono::steady_clock;
 constexpr int k_beats_a_lease = 5;
 constexpr auto k_store_again = std::chrono::milliseconds(500);
 
-bool away(const Error& error) {
+bool database_away(const Error& error) {
   return error.code == Errc::storage_unavailable || error.code == Errc::storage_full;
 }
 
@@ -72,7 +72,7 @@ void WorkRunner::settle(const WorkClaim& claim, std::string_view what, const std
     if (stored) return deps_.tell(what, claim, "");
     if (stored.error().code == Errc::conflict)
       return deps_.tell("job taken over, nothing is stored", claim, stored.error().message);
-    if (!away(stored.error())) {
+    if (!database_away(stored.error())) {
       deps_.tell("result refused by the database", claim, stored.error().message);
       (void)deps_.work.fail(claim, stored.error()).has_value();
       return;
