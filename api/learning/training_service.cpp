@@ -24,10 +24,15 @@ std::string manifest_of(const std::string& artifact) {
 
 TrainingService::TrainingService(Deps deps) : deps_(std::move(deps)) {
   if (deps_.desk == nullptr) return;
-  deps_.desk->take_in("training", [this](const JobId& id, const std::string& answer) -> Result<JobEnd> {
-    BOOST_OUTCOME_TRY(const auto run, deps_.runs.run(TrainingRunId{id.uuid}));
-    return take_in(run, answer);
-  });
+  deps_.desk->add("training",
+                  {.message = [this](const JobId& id) -> Result<std::string> {
+                     BOOST_OUTCOME_TRY(const auto run, deps_.runs.run(TrainingRunId{id.uuid}));
+                     return message_of(run);
+                   },
+                   .take_in = [this](const JobId& id, const std::string& answer) -> Result<JobEnd> {
+                     BOOST_OUTCOME_TRY(const auto run, deps_.runs.run(TrainingRunId{id.uuid}));
+                     return take_in(run, answer);
+                   }});
 }
 
 Result<std::string> TrainingService::message_of(const TrainingRun& run) const {

@@ -48,7 +48,7 @@ struct WorkDesk::State {
   };
   Deps deps;
   WorkRunner runner;
-  std::map<std::string, TakeIn> take_in;
+  std::map<std::string, Kind> kinds;
   Locked<Now> now;
   std::condition_variable changed;
   std::unique_ptr<Executor> strand;
@@ -69,6 +69,7 @@ struct WorkDesk::State {
   void work();
   Result<void> round();
   Result<void> follow(const WorkStatus& status);
+  Result<void> hand_out_anew(const WorkStatus& status);
   Result<void> conclude(const WorkStatus& status, Job job);
   Result<void> look_after_waiting(const std::vector<WorkStatus>& all);
   Result<Job> handed_out(Job job, std::string message);
@@ -115,6 +116,7 @@ Result<void> WorkDesk::State::follow(const WorkStatus& status) {
   job.attempts = status.attempts;
   job.worker = status.worker;
   if (status.state == WorkState::done) return conclude(status, std::move(job));
+  if (status.waiting_s > 0 && status.version != deps.options.version) return hand_out_anew(status);
   const bool claimed = status.state == WorkState::claimed;
   job.state = claimed ? JobState::running : JobState::queued;
   job.fraction = claimed ? k_share_of_work * status.fraction : 0;
@@ -130,15 +132,23 @@ Result<void> WorkDesk::State::follow(const WorkStatus& status) {
   return deps.jobs.save(job);
 }
 
+/// The server was updated meanwhile: its workers would never claim what the former one wrote.
+Result<void> WorkDesk::State::hand_out_anew(const WorkStatus& status) {
+  const auto how = kinds.find(status.kind);
+  if (how == kinds.end()) return boost::outcome_v2::success();
+  BOOST_OUTCOME_TRY(auto message, how->second.message(status.job));
+  return deps.work.offer({status.job, status.kind, deps.options.version, std::move(message)});
+}
+
 Result<void> WorkDesk::State::conclude(const WorkStatus& status, Job job) {
   BOOST_OUTCOME_TRY(const auto outcome, deps.work.outcome(status.job));
   Result<JobEnd> end = make_error(Errc::internal, "nobody takes in a job of kind " + job.kind);
   if (outcome.error) {
     end = *outcome.error;
-  } else if (const auto how = take_in.find(job.kind); how != take_in.end()) {
+  } else if (const auto how = kinds.find(job.kind); how != kinds.end()) {
     job.stage = "store";
     job.fraction = k_share_of_work;
-    const auto ran = guarded("job", [&] { end = how->second(job.id, outcome.result); });
+    const auto ran = guarded("job", [&] { end = how->second.take_in(job.id, outcome.result); });
     if (!ran) end = make_error(Errc::internal, ran.what);
   }
   if (!end && store_away(end.error())) return end.error();  // the result is kept: the next round takes it in
@@ -234,8 +244,8 @@ WorkDesk::WorkDesk(Deps deps) : state_(std::make_shared<State>(std::move(deps)))
 
 WorkDesk::~WorkDesk() { stop(); }
 
-void WorkDesk::take_in(std::string kind, TakeIn how) {
-  state_->take_in.insert_or_assign(std::move(kind), std::move(how));
+void WorkDesk::add(std::string kind, Kind how) {
+  state_->kinds.insert_or_assign(std::move(kind), std::move(how));
 }
 
 void WorkDesk::start() {

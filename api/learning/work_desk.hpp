@@ -37,9 +37,14 @@ class WorkDesk {
     RunWork run;
     Options options;
   };
-  /// What a result becomes. Called on the desk's thread, and again after a server that was killed between
-  /// this and the end of the job: it finds out by itself whether it was done already.
-  using TakeIn = std::function<Result<JobEnd>(const JobId& job, const std::string& result)>;
+  /// One kind of job.
+  struct Kind {
+    /// What is to be done, for a job that a server of another version handed out and nobody has begun.
+    std::function<Result<std::string>(const JobId& job)> message;
+    /// What a result becomes. Called on the desk's thread, and again after a server that was killed between
+    /// this and the end of the job: it finds out by itself whether it was done already.
+    std::function<Result<JobEnd>(const JobId& job, const std::string& result)> take_in;
+  };
 
   explicit WorkDesk(Deps deps);
   ~WorkDesk();
@@ -47,7 +52,7 @@ class WorkDesk {
   WorkDesk& operator=(const WorkDesk&) = delete;
 
   /// Before start().
-  void take_in(std::string kind, TakeIn how);
+  void add(std::string kind, Kind how);
   void start();
   /// What runs here is given back; what workers run goes on. Idempotent.
   void stop();

@@ -22,6 +22,7 @@ bool of_the_machine(const Error& error) { return error.code == Errc::link_lost; 
 
 Result<bool> WorkRunner::run_one(std::chrono::milliseconds left_alone,
                                  const std::function<bool()>& stopping) {
+  if (stopping()) return false;
   BOOST_OUTCOME_TRY(const auto claim,
                     deps_.work.claim({deps_.worker, deps_.version, deps_.lease, left_alone}));
   if (!claim) return false;

@@ -39,7 +39,7 @@ inline constexpr auto k_work_state_words = enum_table<WorkState>(
 /// All about a work but its message and its result.
 struct WorkStatus {
   JobId job{};
-  std::string kind;
+  std::string kind, version;
   WorkState state{WorkState::open};
   std::int64_t fence{};
   std::string worker;  ///< of the newest claim; empty: none began it

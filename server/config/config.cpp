@@ -58,7 +58,7 @@ constexpr std::array k_options = {
            flag},
     Option{
         "jobs.lease_s", "15",
-        "with PostgreSQL: a job that runs on the server and of which nothing is heard for so long is taken "
+        "with PostgreSQL: a job that runs on the server and gives no sign for so many seconds is taken "
         "over by a worker",
         seconds},
     Option{"missions.keep_deleted_days", "30", "days of running time that a deleted mission can be restored",

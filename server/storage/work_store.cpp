@@ -15,7 +15,8 @@ constexpr const char* k_insert =
     "open_t_ns, lease_t_ns, cancel_wanted, fraction, stage, detail, fault, result, error_code, error_text) "
     "VALUES (?1, ?2, ?3, ?4, 0, now_ns(), 0, ?5, '', now_ns(), 0, 0, 0, 'queued', '', '', NULL, '', '')";
 constexpr const char* k_all =
-    "SELECT job_id, kind, state, fence, worker, attempts, max_attempts, fraction, stage, detail, fault, "
+    "SELECT job_id, kind, version, state, fence, worker, attempts, max_attempts, fraction, stage, detail, "
+    "fault, "
     "CASE WHEN state = 0 THEN now_ns() - open_t_ns WHEN state = 1 AND lease_t_ns < now_ns() THEN now_ns() - "
     "lease_t_ns ELSE 0 END FROM work ORDER BY job_id";
 constexpr const char* k_outcome = "SELECT state, error_code, error_text, result FROM work WHERE job_id = ?1";
@@ -105,6 +106,7 @@ class SqlWorkStore final : public WorkStore {
         WorkStatus s;
         s.job = query.id<JobId>();
         s.kind = query.text();
+        s.version = query.text();
         s.state = query.one_of(k_work_state_words);
         s.fence = query.integer();
         s.worker = query.text();

@@ -135,6 +135,12 @@ test('a worker makes the bytes that the server makes, and the server signs them'
   server.env.ANCHORD_JOBS_RUN_HERE = 'false';
   await server.start();
   const there = await begin(quick);
+  // As if a server of another version had handed it out: this one does it again, or nobody would ever claim it.
+  await postgres.psql("UPDATE work SET version = '0.0.1'", 'anchord');
+  await eventually(
+    'it is handed out anew',
+    async () => (await postgres.psql('SELECT version FROM work', 'anchord')) !== '0.0.1',
+  );
   // Nobody is there: with a minute gone by the page says so, and the first worker to come takes it.
   await postgres.psql('UPDATE work SET open_t_ns = open_t_ns - 61000000000', 'anchord');
   const alarm = await eventually('an alarm', async () =>
