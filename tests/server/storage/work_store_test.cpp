@@ -10,6 +10,7 @@
 
 #include "core/base/guard.hpp"
 #include "core/base/locked.hpp"
+#include "core/ports/job_store.hpp"
 #include "tests/server/storage/backends.hpp"
 
 namespace anchord {
