@@ -60,6 +60,7 @@ void Application::start() {
   if (state_->deps.broker != nullptr) state_->deps.broker->start(state_->publisher);
   state_->flights.start();
   state_->jobs.start();
+  if (state_->desk) state_->desk->start();
   state_->housekeeping.start();
   state_->heart = Thread("anchord-beat", [this] { state_->beat(); });
 }
@@ -79,6 +80,7 @@ void Application::stop() {
   state_->demonstration.stop();
   state_->flights.stop();
   state_->hub.shut_down();
+  if (state_->desk) state_->desk->stop();
   state_->jobs.stop();
   state_->missions.stop();
   state_->webhooks.stop();

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <filesystem>
 #include <functional>
@@ -35,6 +36,7 @@ struct FlightData;
 class Drone;
 class Executor;
 class WebPost;
+class WorkStore;
 }  // namespace anchord
 
 namespace anchord::api {
@@ -82,7 +84,13 @@ class Application {
     std::function<std::vector<AlarmCondition>()> server_alarms = [] { return std::vector<AlarmCondition>{}; };
     std::function<void(std::string_view request_id, std::string_view what)> log_fault =
         [](std::string_view, std::string_view) {};
-    RunWork run_work = work_inline;            ///< runs the heavy part of a training job
+    RunWork run_work = work_inline;  ///< runs the heavy part of a training job
+    /// Work that other processes may do; null: every job is this process's.
+    WorkStore* work_store{nullptr};
+    bool run_jobs_here{true};  ///< where others may run jobs, this process does too
+    std::chrono::milliseconds job_lease{
+        15'000};                        ///< how long a claim of this process holds without a sign of it
+    std::string worker_name{"server"};  ///< under which it claims
     RunWork run_plan_work = plan_work_inline;  ///< decodes, turns and traces pictures of plans
     bool model_key_is_new{false};              ///< models of before it existed are signed at the start
     std::int64_t keep_deleted_ns{30LL * 86'400 * 1'000'000'000};  ///< a deleted mission, in running time
@@ -121,7 +129,8 @@ class Application {
   Hub& hub();
   /// Where rows of this server's own devices go.
   DeviceRows& device_rows();
-  /// Marks jobs of the last run as interrupted, starts heartbeats and the job thread.
+  /// Marks jobs of the last run as interrupted, but for those that workers have, starts heartbeats and the
+  /// job thread.
   void start();
   /// Sends what was collected for the streams; to be called every 50 ms from start() to stop(), on the thread
   /// that writes the sockets.

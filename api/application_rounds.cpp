@@ -117,6 +117,8 @@ void Application::State::publish_alarms(UtcTime now, std::vector<AlarmCondition>
       holding.push_back({"mqtt.disconnected", AlarmPriority::warning, std::move(away), std::nullopt});
   }
   for (auto& alarm : deps.server_alarms()) holding.push_back(std::move(alarm));
+  if (desk)
+    for (auto& alarm : desk->alarms()) holding.push_back(std::move(alarm));
   for (auto& alarm : stream.alarms()) holding.push_back(std::move(alarm));
   for (auto& alarm : contradictions.alarms()) holding.push_back(std::move(alarm));
   alarms.update(std::move(holding), now);

@@ -75,6 +75,7 @@ Application::State::State(Deps d)
       device_ingest(stores.measurements, missions),
       demonstration({missions, device_ingest, events, deps.clock, deps.demonstration}),
       jobs(stores.jobs, hub, deps.clock, deps.work.jobs),
+      desk(make_desk()),
       geo(deps.geoid_dir),
       contradictions({stores.anchors, stores.calibrations, stores.revisions, stores.missions, events}),
       profiles(stores.kits, stores.missions, deps.clock),
@@ -93,7 +94,7 @@ Application::State::State(Deps d)
            .track = deps.track,
            .contradictions = contradictions}),
       training({stores.datasets, stores.training_runs, jobs, events, deps.clock, deps.run_work,
-                deps.build.version, signer}),
+                deps.build.version, signer, desk.get()}),
       omlox_locations(hub, stores.missions),
       omlox_push({anchor_api, stores.places, omlox_locations, deps.web_post}),
       webhooks({stores.webhooks, deps.web_post, deps.clock, [this] { return running.now_ns(); },
@@ -213,6 +214,19 @@ Application::State::State(Deps d)
   };
   add_routes();
   events.on_event([this](const LiveEvent& event) { webhooks.notify(event); });
+}
+
+std::unique_ptr<WorkDesk> Application::State::make_desk() {
+  if (deps.work_store == nullptr) return nullptr;
+  return std::make_unique<WorkDesk>(
+      WorkDesk::Deps{.work = *deps.work_store,
+                     .job_store = stores.jobs,
+                     .jobs = jobs,
+                     .events = events,
+                     .clock = deps.clock,
+                     .on = deps.work.jobs,
+                     .run = deps.run_work,
+                     .options = {deps.build.version, deps.worker_name, deps.run_jobs_here, deps.job_lease}});
 }
 
 void Application::State::add_routes() {

@@ -32,6 +32,7 @@
 #include "api/flight/routes.hpp"
 #include "api/kit/late_writer.hpp"
 #include "api/learning/routes.hpp"
+#include "api/learning/work_desk.hpp"
 #include "api/measurements/demonstration.hpp"
 #include "api/measurements/device_ingest.hpp"
 #include "api/measurements/ingest.hpp"
@@ -58,6 +59,7 @@ namespace anchord::api {
 struct Application::State {
   explicit State(Deps d);
   void add_routes();
+  std::unique_ptr<WorkDesk> make_desk();
 
   ServerCounts counts() const;
   nlohmann::ordered_json device_clock() const;
@@ -96,6 +98,7 @@ struct Application::State {
   DeviceIngest device_ingest;
   Demonstration demonstration;
   JobService jobs;
+  std::unique_ptr<WorkDesk> desk;  ///< null: every job is this process's
   GeoService geo;
   ContradictionWatch contradictions;
   KitProfiles profiles;

@@ -26,6 +26,8 @@ Ordered job_json(const Job& job) {
   out["created_at"] = to_rfc3339(job.created);
   out["started_at"] = job.started ? Ordered(to_rfc3339(*job.started)) : Ordered(nullptr);
   out["finished_at"] = job.finished ? Ordered(to_rfc3339(*job.finished)) : Ordered(nullptr);
+  out["worker"] = job.worker.empty() ? Ordered(nullptr) : Ordered(job.worker);
+  out["attempts"] = job.attempts;
   out["links"] = std::move(links);
   out["problem"] = kept_json(job.problem.text);
   return out;

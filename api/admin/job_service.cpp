@@ -20,6 +20,24 @@ namespace {
 
 bool ended(JobState state) { return state != JobState::queued && state != JobState::running; }
 
+Job new_job(UtcTime now, std::string kind, std::string request_json, std::optional<JobId> id) {
+  Job job;
+  job.created = now;
+  job.id = id.value_or(JobId{make_uuid_v7(now)});
+  job.kind = std::move(kind);
+  job.stage = "queued";
+  job.request = {std::move(request_json)};
+  return job;
+}
+
+Result<Job> begun_anew(const Job& before) {
+  if (before.state == JobState::succeeded) return make_error(Errc::conflict, "the job has succeeded");
+  if (!ended(before.state)) return make_error(Errc::conflict, "the job waits or runs already");
+  Job job = new_job(before.created, before.kind, before.request.text, before.id);
+  job.result_href = before.result_href;
+  return job;
+}
+
 }  // namespace
 
 struct JobService::State {
@@ -47,6 +65,7 @@ struct JobService::State {
     std::uint64_t changes{0};  ///< of states of jobs
   };
   std::condition_variable changed;
+  std::function<Result<bool>(const JobId&)> cancel_elsewhere;
   Locked<Lanes> lanes;
 
   void publish(const Job& job) {
@@ -55,6 +74,9 @@ struct JobService::State {
   void save(const Job& job) {
     // A job that cannot be written is still shown live; after a restart it counts as interrupted.
     (void)jobs.update(job).has_value();
+    tell(job);
+  }
+  void tell(const Job& job) {
     publish(job);
     {
       auto now = lanes.lock();
@@ -167,12 +189,7 @@ void JobService::stop() {
 
 Result<Job> JobService::submit(std::string kind, std::string request_json, Work work,
                                std::optional<JobId> id) {
-  Job job;
-  job.created = state_->clock.now();
-  job.id = id.value_or(JobId{make_uuid_v7(job.created)});
-  job.kind = std::move(kind);
-  job.stage = "queued";
-  job.request = {std::move(request_json)};
+  const Job job = new_job(state_->clock.now(), std::move(kind), std::move(request_json), id);
   BOOST_OUTCOME_TRYV(state_->admit(job.kind));
   BOOST_OUTCOME_TRYV(state_->jobs.insert(job));
   state_->enqueue(state_, job, std::move(work));
@@ -180,20 +197,36 @@ Result<Job> JobService::submit(std::string kind, std::string request_json, Work 
 }
 
 Result<Job> JobService::restart(const JobId& id, Work work) {
-  BOOST_OUTCOME_TRY(auto job, state_->jobs.job(id));
-  if (job.state == JobState::succeeded) return make_error(Errc::conflict, "the job has succeeded");
-  if (!ended(job.state)) return make_error(Errc::conflict, "the job waits or runs already");
+  BOOST_OUTCOME_TRY(const auto stored, state_->jobs.job(id));
+  BOOST_OUTCOME_TRY(const auto job, begun_anew(stored));
   BOOST_OUTCOME_TRYV(state_->admit(job.kind));
-  job.state = JobState::queued;
-  job.fraction = 0;
-  job.stage = "queued";
-  job.detail.clear();
-  job.problem = {};
-  job.started.reset();
-  job.finished.reset();
   BOOST_OUTCOME_TRYV(state_->jobs.update(job));
   state_->enqueue(state_, job, std::move(work));
   return job;
+}
+
+Result<Job> JobService::submit_elsewhere(std::string kind, std::string request_json, const JobId& id) {
+  const Job job = new_job(state_->clock.now(), std::move(kind), std::move(request_json), id);
+  BOOST_OUTCOME_TRYV(state_->jobs.insert(job));
+  state_->publish(job);
+  return job;
+}
+
+Result<Job> JobService::restart_elsewhere(const JobId& id) {
+  BOOST_OUTCOME_TRY(const auto stored, state_->jobs.job(id));
+  BOOST_OUTCOME_TRY(const auto job, begun_anew(stored));
+  BOOST_OUTCOME_TRYV(save(job));
+  return job;
+}
+
+Result<void> JobService::save(const Job& job) {
+  BOOST_OUTCOME_TRYV(state_->jobs.update(job));
+  state_->tell(job);
+  return boost::outcome_v2::success();
+}
+
+void JobService::cancel_elsewhere(std::function<Result<bool>(const JobId&)> cancel) {
+  state_->cancel_elsewhere = std::move(cancel);
 }
 
 Result<Job> JobService::wait(const JobId& id, std::chrono::milliseconds longest) {
@@ -211,6 +244,10 @@ Result<Job> JobService::wait(const JobId& id, std::chrono::milliseconds longest)
 Result<Job> JobService::cancel(const JobId& id) {
   BOOST_OUTCOME_TRY(auto job, state_->jobs.job(id));
   if (ended(job.state)) return make_error(Errc::conflict, "the job has ended");
+  if (state_->cancel_elsewhere) {
+    BOOST_OUTCOME_TRY(const bool there, state_->cancel_elsewhere(id));
+    if (there) return wait(id, std::chrono::seconds(1));
+  }
   std::string kind = job.kind;
   bool waiting = false;
   {
@@ -257,6 +294,7 @@ void JobService::State::run(const Task& task) {
   Job job = std::move(stored).value();
   job.state = JobState::running;
   job.started = clock.now();
+  ++job.attempts;
   Context context(*this, job);
   context.progress(0, "load", "");
   Result<JobEnd> result = make_error(Errc::internal, "");

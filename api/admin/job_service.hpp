@@ -45,7 +45,8 @@ class JobService {
   JobService(const JobService&) = delete;
   JobService& operator=(const JobService&) = delete;
 
-  /// Jobs of the last run become failed: interrupted. From here on jobs run.
+  /// Jobs of the last run become failed: interrupted, but for those that run elsewhere. From here on jobs
+  /// run.
   void start();
   /// Asks what runs to end, and waits for it; what waits is marked interrupted by the next start.
   void stop();
@@ -56,6 +57,15 @@ class JobService {
   Result<Job> restart(const JobId& id, Work work);
   /// Waits for the end of a job; the job as it is after that time otherwise.
   Result<Job> wait(const JobId& id, std::chrono::milliseconds longest);
+  /// Jobs that other processes run, of which the caller keeps the state: they take no lane here.
+  Result<Job> submit_elsewhere(std::string kind, std::string request_json, const JobId& id);
+  /// As restart().
+  Result<Job> restart_elsewhere(const JobId& id);
+  /// A new state of such a job: written, told on topic `jobs` and to who waits.
+  Result<void> save(const Job& job);
+  /// Asked first when somebody cancels a job; true: it is canceled there. To be set before start().
+  void cancel_elsewhere(std::function<Result<bool>(const JobId&)> cancel);
+
   /// conflict when it has ended.
   Result<Job> cancel(const JobId& id);
 

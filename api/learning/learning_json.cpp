@@ -130,6 +130,8 @@ Ordered training_run_json(const TrainingRun& r, const DatasetRecord& d, const Jo
               {"created_by", r.created_by},
               {"model", r.model ? Ordered("/api/v1/models/" + to_string(*r.model)) : Ordered(nullptr)},
               {"job", "/api/v1/jobs/" + to_string(r.id)},
+              {"worker", job.worker.empty() ? Ordered(nullptr) : Ordered(job.worker)},
+              {"attempts", job.attempts},
               {"progress", job_json(job)["progress"]},
               {"metrics", summary.contains("metrics") ? summary["metrics"] : Ordered(nullptr)},
               {"problem", job_json(job)["problem"]}};

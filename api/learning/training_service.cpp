@@ -6,6 +6,7 @@
 #include "api/admin/job_service.hpp"
 #include "api/learning/model_artifact.hpp"
 #include "api/learning/model_signer.hpp"
+#include "api/learning/work_desk.hpp"
 #include "core/base/sha256.hpp"
 #include "core/base/to_wire.hpp"
 
@@ -21,19 +22,44 @@ std::string manifest_of(const std::string& artifact) {
   return json.is_object() && json.contains("manifest") ? to_wire(json["manifest"]) : "{}";
 }
 
-Result<std::string> TrainingService::work(const TrainingRun& run, JobContext& job) {
+TrainingService::TrainingService(Deps deps) : deps_(std::move(deps)) {
+  if (deps_.desk == nullptr) return;
+  deps_.desk->add("training",
+                  {.message = [this](const JobId& id) -> Result<std::string> {
+                     BOOST_OUTCOME_TRY(const auto run, deps_.runs.run(TrainingRunId{id.uuid}));
+                     return message_of(run);
+                   },
+                   .take_in = [this](const JobId& id, const std::string& answer) -> Result<JobEnd> {
+                     BOOST_OUTCOME_TRY(const auto run, deps_.runs.run(TrainingRunId{id.uuid}));
+                     return take_in(run, answer);
+                   }});
+}
+
+Result<std::string> TrainingService::message_of(const TrainingRun& run) const {
   BOOST_OUTCOME_TRY(const auto csv, deps_.datasets.csv(run.dataset));
-  const std::string message = to_wire(Json{{"kind", "training"},
-                                           {"csv", csv},
-                                           {"request", Json::parse(run.request.text)},
-                                           {"code_version", deps_.code_version}});
-  BOOST_OUTCOME_TRY(
-      const auto answer,
-      deps_.run_work(
-          message, [&job](const WorkProgress& p) { job.progress(0.98 * p.fraction, p.stage, p.detail); },
-          [&job] { return job.canceled(); }));
-  if (job.canceled()) return make_error(Errc::canceled, "canceled");
-  job.progress(0.98, "store", "");
+  return to_wire(Json{{"kind", "training"},
+                      {"csv", csv},
+                      {"request", Json::parse(run.request.text)},
+                      {"code_version", deps_.code_version}});
+}
+
+std::function<Result<JobEnd>(JobContext&)> TrainingService::work_of(const TrainingRun& run) {
+  return [this, run](JobContext& job) -> Result<JobEnd> {
+    BOOST_OUTCOME_TRY(const auto message, message_of(run));
+    BOOST_OUTCOME_TRY(
+        const auto answer,
+        deps_.run_work(
+            message, [&job](const WorkProgress& p) { job.progress(0.98 * p.fraction, p.stage, p.detail); },
+            [&job] { return job.canceled(); }));
+    if (job.canceled()) return make_error(Errc::canceled, "canceled");
+    job.progress(0.98, "store", "");
+    return take_in(run, answer);
+  };
+}
+
+Result<JobEnd> TrainingService::take_in(const TrainingRun& run, const std::string& answer) {
+  const std::string href = "/api/v1/training-runs/" + to_string(run.id);
+  if (run.model) return JobEnd{href, ""};
   const auto json = Json::parse(answer, nullptr, false);
   if (!json.is_object() || !json.contains("artifact") || !json.contains("parts"))
     return make_error(Errc::internal, "the worker's answer cannot be read");
@@ -58,11 +84,7 @@ Result<std::string> TrainingService::work(const TrainingRun& run, JobContext& jo
       deps_.runs.finish(run.id, {json["summary"].get_ref<const std::string&>()}, parts, stored, artifact));
   deps_.events.add(EventLevel::info, "model.trained",
                    stored.method + " for " + stored.task + " is trained: model " + to_string(stored.id));
-  return stored.method;
-}
-
-std::function<Result<std::string>(JobContext&)> TrainingService::work_of(const TrainingRun& run) {
-  return [this, run](JobContext& job) { return work(run, job); };
+  return JobEnd{href, stored.method};
 }
 
 Result<Job> TrainingService::submit(const DatasetId& dataset, std::string task, std::string request_json,
@@ -75,23 +97,22 @@ Result<Job> TrainingService::submit(const DatasetId& dataset, std::string task, 
   run.request = {std::move(request_json)};
   run.created_by = std::move(by);
   BOOST_OUTCOME_TRYV(deps_.runs.insert(run));
-  auto job = deps_.jobs.submit(
-      "training", run.request.text,
-      [work = work_of(run), id = run.id](JobContext& context) -> Result<JobEnd> {
-        BOOST_OUTCOME_TRY(auto detail, work(context));
-        return JobEnd{"/api/v1/training-runs/" + to_string(id), std::move(detail)};
-      },
-      JobId{run.id.uuid});
+  const auto begin = [&]() -> Result<Job> {
+    const JobId id{run.id.uuid};
+    if (deps_.desk == nullptr) return deps_.jobs.submit("training", run.request.text, work_of(run), id);
+    BOOST_OUTCOME_TRY(auto message, message_of(run));
+    return deps_.desk->submit("training", run.request.text, std::move(message), id);
+  };
+  auto job = begin();
   if (!job) (void)deps_.runs.remove(run.id).has_value();
   return job;
 }
 
 Result<Job> TrainingService::restart(const TrainingRunId& id) {
   BOOST_OUTCOME_TRY(const auto run, deps_.runs.run(id));
-  return deps_.jobs.restart(JobId{id.uuid}, [work = work_of(run), id](JobContext& context) -> Result<JobEnd> {
-    BOOST_OUTCOME_TRY(auto detail, work(context));
-    return JobEnd{"/api/v1/training-runs/" + to_string(id), std::move(detail)};
-  });
+  if (deps_.desk == nullptr) return deps_.jobs.restart(JobId{id.uuid}, work_of(run));
+  BOOST_OUTCOME_TRY(auto message, message_of(run));
+  return deps_.desk->restart(JobId{id.uuid}, std::move(message));
 }
 
 }  // namespace anchord::api

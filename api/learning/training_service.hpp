@@ -11,11 +11,14 @@ namespace anchord::api {
 
 class JobService;
 class JobContext;
+struct JobEnd;
 class EventLog;
 class ModelSigner;
+class WorkDesk;
 
 /// Training runs as jobs of kind `training`: the rows go to a worker, what comes back is stored whole or not
-/// at all. Thread-safe.
+/// at all. The worker is a child of this server or, where there is a desk, any process that has the database.
+/// Thread-safe.
 class TrainingService {
  public:
   struct Deps {
@@ -27,8 +30,9 @@ class TrainingService {
     RunWork run_work;
     std::string code_version;
     const ModelSigner& signer;
+    WorkDesk* desk;  ///< null: nobody but this server runs jobs
   };
-  explicit TrainingService(Deps deps) : deps_(std::move(deps)) {}
+  explicit TrainingService(Deps deps);
 
   /// errors: not_found (data set), queue_full
   Result<Job> submit(const DatasetId& dataset, std::string task, std::string request_json, std::string by);
@@ -36,8 +40,10 @@ class TrainingService {
   Result<Job> restart(const TrainingRunId& id);
 
  private:
-  std::function<Result<std::string>(JobContext&)> work_of(const TrainingRun& run);
-  Result<std::string> work(const TrainingRun& run, JobContext& job);
+  Result<std::string> message_of(const TrainingRun& run) const;
+  std::function<Result<JobEnd>(JobContext&)> work_of(const TrainingRun& run);
+  /// Reads, signs and stores what a worker answered. A run that has its model already keeps it.
+  Result<JobEnd> take_in(const TrainingRun& run, const std::string& answer);
   Deps deps_;
 };
 

@@ -26,6 +26,7 @@
 #include "server/http/web_post.hpp"
 #include "server/mqtt/mqtt_broker.hpp"
 #include "server/runtime/backup_keeper.hpp"
+#include "server/runtime/database_worker.hpp"
 #include "server/runtime/device_manager.hpp"
 #include "server/runtime/logging.hpp"
 #include "server/runtime/private_file.hpp"
@@ -61,8 +62,8 @@ std::string settings_text(const Config& config) {
   return out;
 }
 
-/// Backup, calibration, discovery, training, and room for one more.
-constexpr std::size_t k_kinds_of_jobs = 5;
+/// Backup, calibration, discovery, training, pictures of plans, and room for one more.
+constexpr std::size_t k_kinds_of_jobs = 6;
 
 /// For the commands of this machine: a plain address if there is one, and never one that is only for
 /// listening.
@@ -378,6 +379,10 @@ void App::State::compose() {
   deps.broker = broker.get();
   deps.mqtt_prefix = config.text("mqtt.prefix");
   deps.run_plan_work = deps.run_work = work_in_process();
+  deps.work_store = database->work();
+  deps.run_jobs_here = config.flag("jobs.run_here");
+  deps.job_lease = config.seconds("jobs.lease_s");
+  deps.worker_name = "server " + worker_name();
   deps.model_key_is_new = model_key.fresh;
   deps.keep_deleted_ns =
       static_cast<std::int64_t>(config.count("missions.keep_deleted_days")) * 86'400 * 1'000'000'000;

@@ -23,6 +23,7 @@
 #include "server/storage/postgres_database.hpp"
 #include "server/storage/postgres_text.hpp"
 #include "server/storage/sqlite_connection.hpp"
+#include "server/storage/work_store.hpp"
 #include "server/tls/tls_keeper.hpp"
 
 namespace anchord::cli {
@@ -35,6 +36,7 @@ using Json = nlohmann::json;
 constexpr double k_gb = 1e9;
 constexpr double k_least_free_gb = 1, k_wanted_free_gb = 5;  ///< below 1 GB the checklist forbids to fly
 constexpr std::uint64_t k_least_files = 1024;
+constexpr double k_worker_silent_s = 60;
 
 std::string number(double value, int decimals = 1) {
   char text[32];
@@ -116,6 +118,28 @@ Finding postgres(const DoctorOptions& options) {
     return Finding{Level::failed, "database", seen + " of a newer anchord",
                    "install the version that wrote it"};
   return Finding{Level::ok, "database", seen};
+}
+
+/// Who runs jobs of this database beside its server.
+std::vector<Finding> workers_of(const std::string& address) {
+  const auto work = open_work(address);
+  if (!work) return {};  // of another version: the database itself was told of already
+  const auto found = work.value()->workers();
+  if (!found) return {{Level::warning, "workers", found.error().message, "see docs/workers.md"}};
+  std::vector<Finding> out;
+  for (const auto& w : found.value()) {
+    std::string seen = w.name + ", anchord " + w.version + ", ";
+    seen += w.job ? "works on job " + to_string(*w.job) : "waits for jobs";
+    if (w.seen_s_ago > k_worker_silent_s)
+      out.push_back({Level::warning, "worker", seen + ", not seen for " + number(w.seen_s_ago, 0) + " s",
+                     "look whether it still runs; its job is taken over by another worker or the server"});
+    else if (w.version != ANCHORD_VERSION)
+      out.push_back({Level::warning, "worker", seen, "it claims only jobs of a server of its own version"});
+    else
+      out.push_back({Level::ok, "worker", seen});
+  }
+  if (out.empty()) out.push_back({Level::ok, "workers", "none: the server runs its jobs itself"});
+  return out;
 }
 
 /// Rows that are elsewhere than the caller thinks.
@@ -270,6 +294,7 @@ std::vector<Finding> examine(const DoctorOptions& options) {
   };
   if (!options.database.empty()) {
     out.push_back(postgres(options));
+    if (out.back().level == Level::ok) add(workers_of(options.database));
   } else if (auto found = rows_elsewhere(options.data_dir)) {
     out.push_back(*std::move(found));
   }

@@ -106,7 +106,7 @@ int worker_main() {
   settle_in(server);
   std::string message;
   if (read_frame(k_socket, message, -1) != FrameRead::frame) {
-    std::fputs("anchord worker: is started by the server, not by hand\n", stderr);
+    std::fputs("anchord worker: without --database this is the process that a server starts by itself\n", stderr);
     return 2;
   }
   settle_for(message);

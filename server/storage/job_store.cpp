@@ -6,21 +6,23 @@ namespace {
 constexpr const char* k_insert =
     "INSERT INTO job (id, kind, state, fraction, stage, detail, result_href, problem_json, request_json, "
     "created_t_ns, "
-    "started_t_ns, finished_t_ns) VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12)";
+    "started_t_ns, finished_t_ns, worker, attempts) VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, "
+    "?12, ?13, ?14)";
 constexpr const char* k_update =
     "UPDATE job SET kind = ?2, state = ?3, fraction = ?4, stage = ?5, detail = ?6, result_href = ?7, "
-    "problem_json = ?8, request_json = ?9, created_t_ns = ?10, started_t_ns = ?11, finished_t_ns = ?12 "
-    "WHERE id = ?1 RETURNING state";
+    "problem_json = ?8, request_json = ?9, created_t_ns = ?10, started_t_ns = ?11, finished_t_ns = ?12, "
+    "worker = ?13, attempts = ?14 WHERE id = ?1 RETURNING state";
 constexpr const char* k_columns =
     "SELECT id, kind, state, fraction, stage, detail, result_href, problem_json, request_json, created_t_ns, "
-    "started_t_ns, finished_t_ns FROM job ";
+    "started_t_ns, finished_t_ns, worker, attempts FROM job ";
 constexpr const char* k_fail_unfinished =
-    "UPDATE job SET state = 3, problem_json = ?2, finished_t_ns = ?1 WHERE state IN (0, 1) RETURNING state";
+    "UPDATE job SET state = 3, problem_json = ?2, finished_t_ns = ?1 WHERE state IN (0, 1) AND NOT "
+    "EXISTS (SELECT 1 FROM work WHERE work.job_id = job.id) RETURNING state";
 static_assert(static_cast<int>(JobState::failed) == 3 && static_cast<int>(JobState::running) == 1);
 
 void bind(Query& query, const Job& j) {
   query << j.id << j.kind << static_cast<int>(j.state) << j.fraction << j.stage << j.detail << j.result_href
-        << j.problem << j.request << j.created << j.started << j.finished;
+        << j.problem << j.request << j.created << j.started << j.finished << j.worker << j.attempts;
 }
 
 Job read(Query& query) {
@@ -37,6 +39,8 @@ Job read(Query& query) {
   j.created = query.time();
   j.started = query.maybe_time();
   j.finished = query.maybe_time();
+  j.worker = query.text();
+  j.attempts = query.as<int>();
   return j;
 }
 

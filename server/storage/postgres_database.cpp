@@ -13,6 +13,7 @@
 #include "server/storage/postgres_text.hpp"
 #include "server/storage/stalled.hpp"
 #include "server/storage/stores.hpp"
+#include "server/storage/work_store.hpp"
 
 namespace anchord {
 namespace {
@@ -36,6 +37,7 @@ class PostgresDatabase final : public Database {
                options.statement_timeout}),
         // The disk is the database server's: whether a mission still fits, it says when it does not.
         kept_(gate_, [] { return std::optional<Error>{}; }),
+        work_(sql::make_work_store(gate_)),
         watch_("anchord-dbwatch", [this] { watch(); }) {}
 
   ~PostgresDatabase() override {
@@ -74,6 +76,7 @@ class PostgresDatabase final : public Database {
   Result<BackupReport> backup(const std::filesystem::path&) override {
     return make_error(Errc::unsupported, k_postgres_backups);
   }
+  WorkStore* work() override { return work_.get(); }
 
  private:
   struct Seen {
@@ -105,6 +108,7 @@ class PostgresDatabase final : public Database {
   const std::unique_ptr<sql::DataFolder> folder_;
   PostgresGate gate_;
   sql::SqlStores kept_;
+  const std::unique_ptr<WorkStore> work_;
   Locked<Seen> seen_;
   std::condition_variable stop_;
   Thread watch_;

@@ -13,6 +13,8 @@
 
 namespace anchord {
 
+class WorkStore;
+
 /// What a commit waits for; docs/durability.md says what survives which accident.
 enum class Synchronous : std::uint8_t { normal, full, extra };
 inline constexpr auto k_synchronous_words = enum_table<Synchronous>(
@@ -77,6 +79,8 @@ class Database {
   virtual StorageHealth health() = 0;
   /// Online copy while writes go on: fsynced, integrity-checked, with its SHA-256. The file must not exist.
   virtual Result<BackupReport> backup(const std::filesystem::path& file) = 0;
+  /// Work that other processes may do; null: this database is of one process.
+  virtual WorkStore* work() { return nullptr; }
 };
 
 /// Opens (first time: makes) DIR/anchord.db, migrates it, checks it. Messages are for the operator's

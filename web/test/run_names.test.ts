@@ -1,5 +1,5 @@
 import { describe, expect, it } from 'vitest';
-import { run_names } from '../src/views/models/words';
+import { course_words, run_names } from '../src/views/models/words';
 
 const run = (id: string, method: string, created_at: string) => ({ id, method, created_at });
 
@@ -22,5 +22,16 @@ describe('names of runs', () => {
     expect(names.get('a')).toMatch(/10:00/);
     expect(names.get('b')).toMatch(/11:30.*no\. 1$/);
     expect(names.get('c')).toMatch(/11:30.*no\. 2$/);
+  });
+});
+
+describe('the course of a run', () => {
+  const of_server = { stage: 'search', fraction: 0.404, worker: '', attempts: 1 };
+  it('names the worker that has it, and no attempt while it is the first', () => {
+    expect(course_words(of_server)).toBe('search 40 %');
+    expect(course_words({ ...of_server, worker: 'lab-pc/812' })).toBe('search 40 % on lab-pc/812');
+  });
+  it('counts the attempts once a worker was taken over', () => {
+    expect(course_words({ ...of_server, worker: 'lab-pc/9', attempts: 2 })).toBe('search 40 % on lab-pc/9, attempt 2');
   });
 });

@@ -47,7 +47,11 @@ TEST_P(AccessContract, FailsJobsThatARestartCutOff) {
   EXPECT_EQ(found.finished, k_noon);
   EXPECT_EQ(db_->stores().jobs.job(done.id).value().state, JobState::succeeded);
   done.detail = "x";
+  done.worker = "host/7";
+  done.attempts = 2;
   ASSERT_TRUE(db_->stores().jobs.update(done));
+  EXPECT_EQ(db_->stores().jobs.job(done.id).value().worker, "host/7");
+  EXPECT_EQ(db_->stores().jobs.job(done.id).value().attempts, 2);
   EXPECT_EQ(db_->stores().jobs.jobs(10, std::nullopt).value().size(), 2u);
   EXPECT_EQ(db_->stores().jobs.job(JobId{}).error().code, Errc::not_found);
 }

@@ -35,6 +35,8 @@ export interface Run extends Pick<WireRun, 'id' | 'state' | 'task' | 'method' | 
   readonly seconds: number | null;
   readonly model: string | null;
   readonly job: string | null;
+  readonly worker: string; ///< empty: the server, or nobody yet
+  readonly attempts: number;
   readonly stage: string;
   readonly fraction: number | null;
   readonly metrics: Scores;
@@ -110,6 +112,8 @@ function run_of(o: WireRun): Run {
     seconds: Number.isNaN(begun) || Number.isNaN(ended) ? null : (ended - begun) / 1000,
     model: tail(o.model),
     job: tail(o.job),
+    worker: o.worker ?? '',
+    attempts: o.attempts,
     stage: str(progress?.stage),
     fraction: num(progress?.fraction),
     metrics: scores_of(o.metrics),

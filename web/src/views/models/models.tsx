@@ -18,7 +18,7 @@ import { Promote } from './promote';
 import { Rules } from './rules';
 import { RunTable } from './run_table';
 import { task, useModels } from './use_models';
-import { method_words, TASK_WORDS, why_words } from './words';
+import { course_words, method_words, TASK_WORDS, why_words } from './words';
 
 const rules_open = signal(false);
 
@@ -195,12 +195,7 @@ function StateChip({ run, active }: { run: Run; active: Model | undefined }) {
   if (run.state === 'running' || run.state === 'queued')
     return (
       <Chip shape="estimating" tone="info" word={run.state.toUpperCase()}>
-        {run.stage && (
-          <span class="mut">
-            {' '}
-            {run.stage} {run.fraction === null ? '' : `${fixed(run.fraction * 100, 0)} %`}
-          </span>
-        )}
+        {run.stage && <span class="mut"> {course_words(run)}</span>}
       </Chip>
     );
   return (

@@ -3,7 +3,7 @@ import { is_bias, type Model, type Run, type Task } from '../../api/learning';
 import { date, fixed } from '../../ui/format';
 import { Chip, Q, type Shape, type Tone } from '../../ui/marks';
 import { MOST_COMPARED } from './compare';
-import { method_words, run_names } from './words';
+import { course_words, method_words, run_names } from './words';
 
 const pc = (v: number | null) => <Q v={fixed(v === null ? null : v * 100, 1)} u="%" />,
   mm = (v: number | null) => <Q v={fixed(v === null ? null : v * 1000, 0)} u="mm" />;
@@ -130,12 +130,7 @@ export function RunTable({
             </th>
             <td>
               {state(r)}
-              {r.state === 'running' && (
-                <span class="mut">
-                  {' '}
-                  {r.stage} {r.fraction === null ? '' : `${fixed(r.fraction * 100, 0)} %`}
-                </span>
-              )}
+              {r.state === 'running' && <span class="mut"> {course_words(r)}</span>}
             </td>
             <td>{r.dataset}</td>
             {bias ? (

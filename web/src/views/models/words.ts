@@ -1,6 +1,6 @@
 /// Names of learning as people say them. No DOM.
-import { date } from '../../ui/format';
-import type { Task } from '../../api/learning';
+import { date, fixed } from '../../ui/format';
+import type { Run, Task } from '../../api/learning';
 
 export const TASK_WORDS: Record<Task, string> = {
   nlos_id: 'LOS or NLOS',
@@ -106,3 +106,10 @@ const FEATURES: Record<string, string> = {
   std_noise: 'Noise',
 };
 export const feature_words = (f: string): string => FEATURES[f] ?? f.replaceAll('_', ' ');
+
+/// Where a run goes on and how it goes: "search 40 % on lab-pc/812, attempt 2".
+export function course_words(run: Pick<Run, 'stage' | 'fraction' | 'worker' | 'attempts'>): string {
+  const share = run.fraction === null ? '' : ` ${fixed(run.fraction * 100, 0)} %`;
+  const place = run.worker && ` on ${run.worker}`;
+  return `${run.stage}${share}${place}${run.attempts > 1 ? `, attempt ${run.attempts}` : ''}`;
+}
