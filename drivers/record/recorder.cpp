@@ -123,6 +123,7 @@ Result<void> Recorder::State::next_part(const link::Arrival& at) {
     now->new_name = true;
     now->file = path;
     now->place = FilePlace(path);
+    taken_away = false;  // under the lock, as the syncing thread sets it: of this part, not of the one before
     now->failure.clear();
   }
   wake.notify_all();
@@ -267,7 +268,7 @@ void Recorder::take(const Event& event) {
   }
   // After a failure the old part may end in half a record: what comes goes to a new one.
   // So does what comes after a part was removed, renamed or replaced: nobody would find it there.
-  if (broken || s.taken_away.exchange(false) || s.in_part >= s.options.rotate_bytes) {
+  if (broken || s.taken_away || s.in_part >= s.options.rotate_bytes) {
     if (const auto next = s.next_part(event.at); !next) {
       ++s.lost;
       return s.fail(event.at.steady_ns, std::strerror(errno));

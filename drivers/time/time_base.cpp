@@ -22,7 +22,7 @@ void TimeBase::receiver_said(int receiver, UtcTime measured, const link::Arrival
     return receiver_.add(measured.ns, at.steady_ns);
   }
   if (heard_ns_ && static_cast<double>(at.steady_ns - *heard_ns_) * 1e-9 < k_silent_s) return;
-  if (!heir_) heir_ = Heir{receiver, {}};
+  if (!heir_) heir_ = Heir{receiver, ClockModel{}};
   if (heir_->id != receiver) return;
   heir_->model.add(measured.ns, at.steady_ns);
   if (!heir_->model.settled()) return;

@@ -49,7 +49,7 @@ class TimeBase {
  private:
   struct Heir {
     int id{};
-    ClockModel model{};
+    ClockModel model;
   };
   ClockModel receiver_;
   std::optional<int> receiver_id_{};
