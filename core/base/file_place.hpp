@@ -1,7 +1,6 @@
 #pragma once
 
-#include <sys/types.h>
-
+#include <cstdint>
 #include <filesystem>
 
 namespace anchord {
@@ -17,8 +16,8 @@ class FilePlace {
 
  private:
   std::filesystem::path file_;
-  dev_t device_{0};
-  ino_t inode_{0};  ///< of an open file no other file gets it; 0: there was none
+  std::uint64_t device_{0};
+  std::uint64_t inode_{0};  ///< of an open file no other file gets it; 0: there was none
 };
 
 }  // namespace anchord
