@@ -82,7 +82,7 @@ set(core_source "^(ceres/|libsvm/|glog/|pthread\\.h$|opencv2/|GeographicLib/|pro
 
 # SHA-256 and base64, for everybody.
 set(core/base_header "^(${everywhere})")
-set(core/base_source "^(openssl/evp\\.h$|pthread\\.h$|sys/random\\.h$|immintrin\\.h$)")
+set(core/base_source "^(openssl/evp\\.h$|pthread\\.h$|sys/(random|stat)\\.h$|immintrin\\.h$)")
 
 # A live flight is deterministic: no library, and (rules below) no clock, thread or lock.
 set(core/flight_header "^(${everywhere})")

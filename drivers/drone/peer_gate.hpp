@@ -15,8 +15,9 @@
 namespace anchord::drone {
 
 /// Who on the link is the aircraft. The first autopilot whose heartbeat is heard is taken, and kept until its
-/// heartbeat has been missing for 10 s or a person changes it; an aircraft that was armed when it fell silent
-/// is followed by its own system id alone. With a key only signed frames count. Everybody else is counted.
+/// heartbeat has been missing for 10 s, its connection was closed, or a person changes it; an aircraft that
+/// was armed when it fell silent is followed by its own system id alone. With a key only signed frames count.
+/// Everybody else is counted.
 ///
 /// Pure: datagrams (or pieces of a stream, whose sender is "") and time in, a verdict out. Not thread-safe.
 class PeerGate {
@@ -30,6 +31,8 @@ class PeerGate {
   void change(const std::string& sender);
   /// The aircraft of a flight that goes on: as if it had been heard now, armed.
   void expect(double now_s, const DroneIdentity& aircraft);
+  /// The peer's connection was closed: the aircraft may come by another at once.
+  void closed() { last_seen_s_ = -1e9; }
 
   const std::optional<std::string>& peer() const { return peer_; }
   const mavlink::Address& vehicle() const { return vehicle_; }

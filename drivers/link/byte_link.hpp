@@ -42,8 +42,8 @@ struct LinkHandlers {
   /// Once, after which the link is dead and a new one is made: did not open, or was lost. For people, one
   /// line.
   std::function<void(const Error& why)> on_closed{};
-  /// UDP: whether this datagram counts, and its sender is who we answer from now on. Absent: the latest
-  /// sender is. What is not welcome never reaches on_bytes.
+  /// UDP, tcp-listen: whether these bytes count, and their sender is who we answer from now on. Absent: the
+  /// latest sender, or connection, is. What is not welcome never reaches on_bytes.
   std::function<bool(std::string_view bytes, const std::string& sender, const Arrival& at)> welcome{};
 };
 

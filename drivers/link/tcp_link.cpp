@@ -1,5 +1,7 @@
+#include <algorithm>
 #include <boost/asio/connect.hpp>
 #include <boost/asio/ip/tcp.hpp>
+#include <vector>
 
 #include "drivers/link/stream_link.hpp"
 
@@ -116,7 +118,8 @@ class TcpLink : public ByteLink {
 };
 
 /// Waits for the device to come. One peer at a time, and the newest wins: a rover that rebooted is back
-/// before its old connection is known to be dead.
+/// before its old connection is known to be dead. Where the handlers say who is welcome, nobody wins by
+/// connecting: each connection is a guest until bytes of it were welcome.
 class ListenLink final : public ByteLink {
  public:
   ListenLink(asio::io_context& io, Address address, const LinkOptions& options)
@@ -145,12 +148,22 @@ class ListenLink final : public ByteLink {
     ErrorCode ignored;
     state_->acceptor.close(ignored);
     if (const auto peer = std::exchange(state_->peer, nullptr)) peer->stop();
+    for (const auto& guest : std::exchange(state_->guests, {})) guest.pump->stop();
   }
   bool is_open() const override { return state_->shared->open; }
   LinkCounters counters() const override { return state_->shared->counters; }
   std::uint16_t port() const override { return state_->address.port; }
 
  private:
+  using TcpPump = Pump<tcp::socket>;
+  static constexpr std::size_t k_guests = 8;  ///< of a hostile network; the oldest goes, but never the peer
+
+  /// A connection and who its bytes go to.
+  struct Guest {
+    std::shared_ptr<Shared> line;
+    std::shared_ptr<TcpPump> pump;
+  };
+
   struct State : std::enable_shared_from_this<State> {
     State(asio::io_context& context, Address where)
         : io(context), address(std::move(where)), acceptor(context), shared(std::make_shared<Shared>()) {}
@@ -185,26 +198,80 @@ class ListenLink final : public ByteLink {
 
     void take(tcp::socket socket) {
       keep_alive(socket);
+      if (shared->handlers.welcome) return receive_guest(std::move(socket));
       if (const auto old = std::exchange(peer, nullptr)) old->stop();
-      peer = std::make_shared<Pump<tcp::socket>>(std::move(socket), shared,
-                                                 [weak = weak_from_this()](const ErrorCode&, bool) {
-                                                   // The next one may come; silence is the supervisor's
-                                                   // business.
-                                                   if (const auto self = weak.lock()) {
-                                                     self->peer = nullptr;
-                                                     self->shared->open = false;
-                                                   }
-                                                 });
+      peer = std::make_shared<TcpPump>(std::move(socket), shared,
+                                       [weak = weak_from_this()](const ErrorCode&, bool) {
+                                         if (const auto self = weak.lock()) self->peer_went();
+                                       });
       const auto now = peer;
       shared->opened();
       if (!shared->closed) now->start();
+    }
+
+    /// The next one may come; silence is the supervisor's business.
+    void peer_went() {
+      peer = nullptr;
+      shared->open = false;
+    }
+
+    /// Its bytes go to whoever judges them first, and to the handlers only when they were welcome.
+    void receive_guest(tcp::socket socket) {
+      ErrorCode gone;
+      const auto from = socket.remote_endpoint(gone);
+      if (gone) return;
+      const std::string host = from.address().to_string();
+      const std::string name =
+          (from.address().is_v6() ? '[' + host + ']' : host) + ':' + std::to_string(from.port());
+      const auto line = std::make_shared<Shared>();
+      line->options = shared->options;
+      const auto guest = std::make_shared<TcpPump>(
+          std::move(socket), line, [weak = weak_from_this(), of = line.get()](const ErrorCode&, bool) {
+            if (const auto self = weak.lock()) self->left(of);
+          });
+      line->handlers.on_bytes = [weak = weak_from_this(), of = line.get(), name](std::string_view bytes,
+                                                                                 const Arrival& at) {
+        if (const auto self = weak.lock()) self->judge(of, bytes, name, at);
+      };
+      guests.push_back({line, guest});
+      guest->start();
+      if (guests.size() <= k_guests) return;
+      const auto oldest = guests.front().pump == peer ? guests.begin() + 1 : guests.begin();
+      oldest->pump->stop();
+      guests.erase(oldest);
+    }
+
+    void judge(const Shared* of, std::string_view bytes, const std::string& name, const Arrival& at) {
+      const auto found = guest_of(of);
+      if (shared->closed || found == guests.end() || !shared->handlers.welcome(bytes, name, at)) return;
+      if (found->pump != peer) {
+        if (const auto old = std::exchange(peer, found->pump)) {
+          old->stop();
+          std::erase_if(guests, [&](const Guest& one) { return one.pump == old; });
+        }
+        shared->opened();
+      }
+      if (!shared->closed) shared->took(bytes);
+    }
+
+    void left(const Shared* of) {
+      const auto found = guest_of(of);
+      if (found == guests.end()) return;
+      if (found->pump == peer) peer_went();
+      guests.erase(found);
+    }
+
+    std::vector<Guest>::iterator guest_of(const Shared* line) {
+      return std::find_if(guests.begin(), guests.end(),
+                          [&](const Guest& one) { return one.line.get() == line; });
     }
 
     asio::io_context& io;
     Address address;
     tcp::acceptor acceptor;
     std::shared_ptr<Shared> shared;
-    std::shared_ptr<Pump<tcp::socket>> peer;
+    std::shared_ptr<TcpPump> peer;
+    std::vector<Guest> guests;  ///< and the peer, where handlers say who is welcome
   };
 
   std::shared_ptr<State> state_;

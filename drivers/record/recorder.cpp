@@ -14,6 +14,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/base/file_place.hpp"
 #include "core/base/guard.hpp"
 #include "core/base/locked.hpp"
 
@@ -54,6 +55,7 @@ struct Parts {
   std::vector<int> finished;  ///< written to their end: the syncing thread syncs and closes them
   bool new_name{false};       ///< a part was begun, and its folder not synced since
   fs::path file;              ///< of fd
+  FilePlace place{{}};        ///< of that file
   std::string failure;        ///< of the last write
   std::string unsynced;       ///< of the last sync: a disk that was pulled takes writes until then
   bool stopping{false};
@@ -89,12 +91,14 @@ struct Recorder::State {
   Locked<Parts> parts;
   std::condition_variable wake;
   std::atomic<std::uint64_t> written{0}, lost{0};
+  std::atomic<bool> scarce{false};      ///< the disk has less than keep_free_bytes
+  std::atomic<bool> taken_away{false};  ///< the part that is written: what follows goes to the next one
   Thread syncer;
 
   Result<void> next_part(const link::Arrival& at);
   void remember(const Event& event);
   bool write(std::string_view bytes);
-  void fail(std::int64_t now_ns, int error);
+  void fail(std::int64_t now_ns, const std::string& why);
   int sync(const ToSync& what) const;
   void sync_loop();
 };
@@ -102,6 +106,8 @@ struct Recorder::State {
 Result<void> Recorder::State::next_part(const link::Arrival& at) {
   int opened = -1;
   fs::path path;
+  std::error_code ignored;
+  fs::create_directories(folder, ignored);  // it may have been taken away since; the open says what is wrong
   do {
     path = folder / part_name(stem, ++part);
     opened = ::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_APPEND | O_CLOEXEC, 0600);
@@ -116,6 +122,8 @@ Result<void> Recorder::State::next_part(const link::Arrival& at) {
     now->fd = fd = opened;
     now->new_name = true;
     now->file = path;
+    now->place = FilePlace(path);
+    taken_away = false;  // under the lock, as the syncing thread sets it: of this part, not of the one before
     now->failure.clear();
   }
   wake.notify_all();
@@ -154,10 +162,10 @@ void Recorder::State::remember(const Event& event) {
   }
 }
 
-void Recorder::State::fail(std::int64_t now_ns, int error) {
+void Recorder::State::fail(std::int64_t now_ns, const std::string& why) {
   retry_at_ns = now_ns + k_retry_ns;
   auto now = parts.lock();
-  now->failure = now->file.string() + ": " + std::strerror(error);
+  now->failure = now->file.string() + ": " + why;
 }
 
 /// errno of what failed first, or 0.
@@ -179,11 +187,15 @@ void Recorder::State::sync_loop() {
   const auto every = std::chrono::milliseconds(options.sync_every_ms);
   for (std::uint64_t synced = 0;;) {
     ToSync due;
+    fs::path file;
+    FilePlace place{{}};
     {
       auto now = parts.lock();
       now.wait_for(wake, every, [](const Parts& p) { return p.stopping || !p.finished.empty(); });
       if (now->stopping) return;
       due = take_finished(*now);
+      file = now->file;
+      place = now->place;
       if (const auto so_far = written.load(); now->fd >= 0 && so_far != synced) {
         if (const int copy = ::dup(now->fd); copy >= 0) {
           due.fds.push_back(copy);
@@ -192,10 +204,18 @@ void Recorder::State::sync_loop() {
       }
     }
     const int failed = sync(due);
-    if (due.fds.empty() && failed == 0) continue;
+    const bool holds = place.holds();
+    std::error_code unknown;
+    const auto space = fs::space(folder, unknown);
+    scarce = !unknown && space.available < options.keep_free_bytes;
+    if (due.fds.empty() && failed == 0 && holds) continue;
     auto now = parts.lock();
     now->unsynced =
         failed == 0 ? "" : now->file.string() + ": cannot be synced to the disk: " + std::strerror(failed);
+    if (holds || now->file != file) continue;
+    taken_away = true;
+    now->unsynced =
+        file.string() + ": was removed, renamed or replaced; what comes next goes to another part";
   }
 }
 
@@ -241,11 +261,17 @@ void Recorder::take(const Event& event) {
     ++s.lost;
     return;
   }
+  if (s.scarce) {
+    ++s.lost;
+    return s.fail(event.at.steady_ns, "less than " + std::to_string(s.options.keep_free_bytes >> 20) +
+                                          " MiB free on the disk, which rows need: make room");
+  }
   // After a failure the old part may end in half a record: what comes goes to a new one.
-  if (broken || s.in_part >= s.options.rotate_bytes) {
+  // So does what comes after a part was removed, renamed or replaced: nobody would find it there.
+  if (broken || s.taken_away || s.in_part >= s.options.rotate_bytes) {
     if (const auto next = s.next_part(event.at); !next) {
       ++s.lost;
-      return s.fail(event.at.steady_ns, errno);
+      return s.fail(event.at.steady_ns, std::strerror(errno));
     }
     s.retry_at_ns = 0;
     const bool told = event.kind == EventKind::added || event.kind == EventKind::mission;
@@ -255,7 +281,7 @@ void Recorder::take(const Event& event) {
   append_record(s.scratch, event);
   if (!s.write(s.scratch)) {
     ++s.lost;
-    s.fail(event.at.steady_ns, errno);
+    s.fail(event.at.steady_ns, std::strerror(errno));
   }
 }
 

@@ -15,6 +15,8 @@ struct RecorderOptions {
   std::uint64_t rotate_bytes = 256u << 20;
   std::int64_t sync_every_ms =
       1'000;  ///< fdatasync, on a thread of its own: the power may go, a process may not
+  /// Of the disk, left to what is made of these bytes: rows are a tenth of them and worth more.
+  std::uint64_t keep_free_bytes = 256u << 20;
 };
 
 /// Appends every event to a file before anybody parses it. Each record goes to the kernel in one write, so a
@@ -22,8 +24,10 @@ struct RecorderOptions {
 /// cut by the reader. Files are `<UTC of the start>-NNNN.anrec`, a new one at rotate_bytes; each begins with
 /// the devices there are, so that any part replays alone.
 ///
-/// A full disk stops the recording, not the flight: take() then counts, and tries again after ten seconds of
-/// event time. One thread calls; failed() and counters from any.
+/// A full disk, or one with less than keep_free_bytes, stops the recording, not the flight: take() then
+/// counts, and tries again after ten seconds of event time. A part that is removed, renamed or replaced
+/// meanwhile is noticed at the next sync, and the next one begun. One thread calls; failed() and counters
+/// from any.
 class Recorder {
  public:
   static Result<std::unique_ptr<Recorder>> open(const std::filesystem::path& folder, UtcTime now,

@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <cstdio>
+#include <utility>
 
 namespace anchord::timing {
 
@@ -14,17 +15,32 @@ void TimeBase::arrived(const link::Arrival& at) {
 void TimeBase::receiver_said(int receiver, UtcTime measured, const link::Arrival& at, double latency_s) {
   arrived(at);
   if (!receiver_id_) receiver_id_ = receiver;
-  if (receiver_id_ != receiver) return;
+  if (receiver_id_ == receiver) {
+    heard_ns_ = at.steady_ns;
+    heir_.reset();
+    latency_s_ = latency_s;
+    return receiver_.add(measured.ns, at.steady_ns);
+  }
+  if (heard_ns_ && static_cast<double>(at.steady_ns - *heard_ns_) * 1e-9 < k_silent_s) return;
+  if (!heir_) heir_ = Heir{receiver, ClockModel{}};
+  if (heir_->id != receiver) return;
+  heir_->model.add(measured.ns, at.steady_ns);
+  if (!heir_->model.settled()) return;
+  receiver_ = std::move(heir_->model);
+  receiver_id_ = receiver;
+  heard_ns_ = at.steady_ns;
   latency_s_ = latency_s;
-  receiver_.add(measured.ns, at.steady_ns);
+  heir_.reset();
 }
 
 void TimeBase::receiver_gone(int receiver) {
-  // What it taught us stays true for minutes; another receiver may take over and starts its own fit.
-  if (receiver_id_ == receiver && !receiver_.settled()) {
-    receiver_id_.reset();
-    receiver_ = ClockModel{};
-  }
+  if (heir_ && heir_->id == receiver) heir_.reset();
+  if (receiver_id_ != receiver) return;
+  // What it taught us stays true for minutes, until the fit of another is settled.
+  heard_ns_.reset();
+  if (receiver_.settled()) return;
+  receiver_id_.reset();
+  receiver_ = ClockModel{};
 }
 
 TimeSource TimeBase::source() const {

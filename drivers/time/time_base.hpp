@@ -26,8 +26,10 @@ class TimeBase {
   /// Every arrival of every device, in order.
   void arrived(const link::Arrival& at);
   /// A receiver's time of measurement and when its last byte arrived. `latency_s`: what the receiver and the
-  /// link need at least (setting of the device); one receiver serves, the first that speaks.
+  /// link need at least (setting of the device); one receiver serves, the first that speaks. Another takes
+  /// over once that one was removed, or silent for k_silent_s, and ten seconds of the other were heard.
   void receiver_said(int receiver, UtcTime measured, const link::Arrival& at, double latency_s);
+  /// Its link was lost, or it was removed.
   void receiver_gone(int receiver);
 
   /// 0.5 s is what a computer without NTP may be off at best; a receiver is known to its latency.
@@ -42,10 +44,17 @@ class TimeBase {
 
   static constexpr double k_latency_sigma_s = 0.02;  ///< of receivers' computing time, between makes
   static constexpr double k_skew_limit_s = 0.05;
+  static constexpr double k_silent_s = 30;
 
  private:
+  struct Heir {
+    int id{};
+    ClockModel model;
+  };
   ClockModel receiver_;
   std::optional<int> receiver_id_{};
+  std::optional<std::int64_t> heard_ns_{};  ///< steady, of the one that serves; absent: it is gone
+  std::optional<Heir> heir_{};              ///< who takes over once its own fit is settled
   double latency_s_{0};
   std::optional<std::int64_t> pinned_ns_{};  ///< system UTC minus steady, at the first arrival
   std::int64_t system_ns_{0};                ///< the same, at the newest

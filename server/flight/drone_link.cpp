@@ -84,7 +84,8 @@ struct DroneLink::Impl {
     handlers.on_bytes = [this](std::string_view in, const link::Arrival& at) {
       // Guarded here, so that the link reads on after a frame that we cannot bear.
       (void)guarded("aircraft", [&] {
-        if (address.kind != link::Kind::udp && !admits(in, "", at)) return;
+        const bool judged = address.kind == link::Kind::udp || address.kind == link::Kind::tcp_listen;
+        if (!judged && !admits(in, "", at)) return;
         auto now = dialogue.lock();
         now->session.feed(seconds(at), at.utc.us(), bytes_of(in));
       });
@@ -112,6 +113,7 @@ struct DroneLink::Impl {
     const auto now = link::arrival_now();
     {
       auto talking = dialogue.lock();
+      if (address.kind == link::Kind::tcp_listen && bytes && !bytes->is_open()) talking->gate.closed();
       talking->session.tick(seconds(now), now.utc.us());
     }
     write();

@@ -132,12 +132,12 @@ MissionId unassigned() {
 
 struct Outbox::State {
   using Open = std::function<std::unique_ptr<SqliteConnection>(SqliteConnection::Mode)>;
-  State(std::unique_ptr<sql::DataFolder> of, const Open& open, std::unique_ptr<SqliteConnection> writer,
-        OutboxState now)
+  State(std::unique_ptr<sql::DataFolder> of, const fs::path& file, const Open& open,
+        std::unique_ptr<SqliteConnection> writer, OutboxState now)
       : folder(std::move(of)),
         counts(now),
         readers([open] { return open(SqliteConnection::Mode::read_only); }, k_readers),
-        queue(std::move(writer), [open] { return open(SqliteConnection::Mode::read_write); },
+        queue(std::move(writer), file, [open] { return open(SqliteConnection::Mode::read_write); },
               {[] { return false; }, [] {}}, {200'000, 100, k_checkpoint_wal_bytes}) {}
 
   std::unique_ptr<sql::DataFolder> folder;  // its lock goes last
@@ -214,7 +214,7 @@ Result<std::unique_ptr<Outbox>> Outbox::open(const fs::path& dir, std::uint64_t 
       return make_error(Errc::storage_unavailable, "the outbox " + file.string() + " is read-only");
     BOOST_OUTCOME_TRYV(prepare(*writer, file));
     const auto now = counted(*writer, max_bytes);
-    auto state = std::make_unique<State>(std::move(folder), open_as, std::move(writer), now);
+    auto state = std::make_unique<State>(std::move(folder), file, open_as, std::move(writer), now);
     return std::unique_ptr<Outbox>(new Outbox(std::move(state)));
   } catch (const sql::SqlError& error) {
     return sql::to_error(error);

@@ -4,6 +4,7 @@
 #include <span>
 
 #include "server/http/response_writer.hpp"
+#include "server/http/text.hpp"
 #ifdef ANCHORD_HAS_WEB
 #include "web/assets.hpp"
 #endif
@@ -24,7 +25,7 @@ const web::WebAsset* find_asset(std::string_view path) {
 bool is_view(std::string_view path) {
   for (const std::string_view face :
        {"/api", "/ogc", "/omlox", "/problems", "/metrics", "/healthz", "/readyz"}) {
-    if (path.starts_with(face)) return false;
+    if (iequals(path.substr(0, face.size()), face)) return false;
   }
   if (path.find("//") != std::string_view::npos) return false;
   const auto slash = path.rfind('/');

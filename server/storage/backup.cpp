@@ -88,6 +88,19 @@ Result<BackupReport> back_up(SqliteConnection& source, const std::filesystem::pa
   return report;
 }
 
+Result<std::filesystem::path> save_beside(SqliteConnection& source, const std::filesystem::path& database) {
+  std::error_code error;
+  std::filesystem::create_directories(database.parent_path(), error);
+  const auto name = [&](int n) { return database.string() + ".saved-" + std::to_string(n); };
+  int n = 1;
+  while (std::filesystem::exists(name(n), error)) ++n;
+  const auto made = back_up(source, name(n));
+  if (made) return std::filesystem::path(name(n));
+  // A disk that was too full for the copy keeps what it has left.
+  for (const char* part : {".part", ".part-journal"}) std::filesystem::remove(name(n) + part, error);
+  return made.error();
+}
+
 }  // namespace anchord::sql
 
 namespace anchord {

@@ -7,4 +7,8 @@ namespace anchord::sql {
 /// Copies the database behind `source` while others write, checks the copy and writes its SHA-256 beside it.
 Result<BackupReport> back_up(SqliteConnection& source, const std::filesystem::path& file);
 
+/// The same to "<database>.saved-N", the first N that is free. Makes the folder again where it is gone, and
+/// leaves nothing behind where it fails.
+Result<std::filesystem::path> save_beside(SqliteConnection& source, const std::filesystem::path& database);
+
 }  // namespace anchord::sql

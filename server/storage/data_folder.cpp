@@ -84,9 +84,14 @@ Result<std::unique_ptr<DataFolder>> DataFolder::open(const std::filesystem::path
   const auto path = dir / k_lock;
   const int fd = open_file(path, O_RDWR | O_CREAT);
   if (fd < 0) return system_error("data folder " + dir.string() + ": " + k_lock, errno);
-  if (::flock(fd, LOCK_EX | LOCK_NB) != 0) {
+  const int folder_fd = open_file(dir, O_RDONLY | O_DIRECTORY);
+  // Where folders take no lock (some network file systems), that of the file is all there is.
+  const bool in_use = ::flock(fd, LOCK_EX | LOCK_NB) != 0 ||
+                      (folder_fd >= 0 && ::flock(folder_fd, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK);
+  if (in_use) {
     const std::string holder = pid_in(fd);
     ::close(fd);
+    if (folder_fd >= 0) ::close(folder_fd);
     return make_error(Errc::conflict,
                       "data folder " + dir.string() + " is in use by another anchord" + holder);
   }
@@ -95,13 +100,16 @@ Result<std::unique_ptr<DataFolder>> DataFolder::open(const std::filesystem::path
     // Only the message for a second process gets poorer: the lock itself is held.
     errno = 0;
   }
-  return std::unique_ptr<DataFolder>(new DataFolder(dir, fd, reserve_bytes));
+  return std::unique_ptr<DataFolder>(new DataFolder(dir, fd, folder_fd, reserve_bytes));
 }
 
-DataFolder::DataFolder(std::filesystem::path dir, int lock_fd, std::uint64_t reserve_bytes)
-    : dir_(std::move(dir)), lock_fd_(lock_fd), reserve_bytes_(reserve_bytes) {}
+DataFolder::DataFolder(std::filesystem::path dir, int lock_fd, int folder_fd, std::uint64_t reserve_bytes)
+    : dir_(std::move(dir)), lock_fd_(lock_fd), folder_fd_(folder_fd), reserve_bytes_(reserve_bytes) {}
 
-DataFolder::~DataFolder() { ::close(lock_fd_); }
+DataFolder::~DataFolder() {
+  ::close(lock_fd_);
+  if (folder_fd_ >= 0) ::close(folder_fd_);
+}
 
 bool DataFolder::had_database() const {
   std::error_code ignored;
@@ -156,6 +164,19 @@ void DataFolder::fill_reserve(std::uint64_t keep_free_bytes) {
 bool DataFolder::give_up_reserve() { return ::unlink((dir_ / k_reserve).c_str()) == 0; }
 
 std::string DataFolder::recovery_commands() const {
+  // Made by a server whose database was taken away from under it, so the newest there is.
+  std::string saved_copies;
+  std::error_code error;
+  for (std::filesystem::directory_iterator it(dir_, error), end; !error && it != end; it.increment(error)) {
+    const std::string name = it->path().filename().string();
+    if (!name.starts_with(database().filename().string() + ".saved-") || name.ends_with(".sha256")) continue;
+    saved_copies +=
+        "\n  anchord backup restore " + shell_quoted(it->path()) + " --data-dir " + shell_quoted(dir_);
+  }
+  if (!saved_copies.empty())
+    return "What was stored when the file was taken away from a running server is beside it. To put it "
+           "back:" +
+           saved_copies;
   const std::string db = shell_quoted(database());
   const std::string recovered = shell_quoted(dir_ / "recovered.db");
   const std::string saved = shell_quoted(dir_.string() + ".damaged");

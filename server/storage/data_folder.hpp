@@ -16,8 +16,9 @@ std::string postgres_of_folder(const std::filesystem::path& dir);
 /// The folder with the database: its lock, its reserve of disk space, and what stands in it.
 class DataFolder {
  public:
-  /// Makes the folder (0700) when absent and takes its lock; from here on the umask is 077.
-  /// Errors: conflict when another process has it; storage_unavailable.
+  /// Makes the folder (0700) when absent and takes its lock, which is on a file in it, that names the
+  /// process, and on the folder itself, which nobody deletes because it looks left over; from here on the
+  /// umask is 077. Errors: conflict when another process has it; storage_unavailable.
   static Result<std::unique_ptr<DataFolder>> open(const std::filesystem::path& dir,
                                                   std::uint64_t reserve_bytes);
   ~DataFolder();
@@ -51,9 +52,9 @@ class DataFolder {
   std::string recovery_commands() const;
 
  private:
-  DataFolder(std::filesystem::path dir, int lock_fd, std::uint64_t reserve_bytes);
+  DataFolder(std::filesystem::path dir, int lock_fd, int folder_fd, std::uint64_t reserve_bytes);
   const std::filesystem::path dir_;
-  const int lock_fd_;
+  const int lock_fd_, folder_fd_;
   const std::uint64_t reserve_bytes_;
 };
 

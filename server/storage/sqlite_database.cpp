@@ -3,6 +3,7 @@
 #include <atomic>
 #include <fstream>
 
+#include "core/base/file_place.hpp"
 #include "core/base/guard.hpp"
 #include "migrations/migration.hpp"
 #include "server/storage/backup.hpp"
@@ -42,7 +43,7 @@ class SqliteDatabase final : public Database, private sql::Gate {
                  std::unique_ptr<SqliteConnection> writer, bool check_in_background)
       : options_(std::move(options)),
         folder_(std::move(folder)),
-        writer_(std::move(writer), [this] { return open_connection(Mode::read_write); },
+        writer_(std::move(writer), folder_->database(), [this] { return open_connection(Mode::read_write); },
                 {[this] { return folder_->give_up_reserve(); },
                  [this] { folder_->fill_reserve(options_.warn_free_bytes); }},
                 {options_.max_queued_rows, options_.max_queued_calls, options_.checkpoint_wal_bytes}),
@@ -90,6 +91,10 @@ class SqliteDatabase final : public Database, private sql::Gate {
   std::optional<std::uint64_t> changes() const override { return counted_changes(); }
 
   std::unique_ptr<SqliteConnection> open_connection(Mode mode) const {
+    // Another file of this name is not what is being served, and no backup of it.
+    if (!place_.holds())
+      throw SqlError(sql::Failure::unavailable,
+                     "database: its file was removed, renamed or replaced while it is in use");
     return std::make_unique<SqliteConnection>(folder_->database(), mode, options_.synchronous,
                                               options_.max_pages);
   }
@@ -136,6 +141,7 @@ class SqliteDatabase final : public Database, private sql::Gate {
   // In this order: readers close first, so that the writer is the last connection and empties the WAL; then
   // the lock.
   const std::unique_ptr<DataFolder> folder_;
+  const FilePlace place_{folder_->database()};
   sql::WriteQueue writer_;
   sql::ReaderPool readers_;
   sql::SqlStores kept_;

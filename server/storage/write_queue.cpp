@@ -2,12 +2,15 @@
 
 #include <utility>
 
+#include "server/storage/backup.hpp"
+
 namespace anchord::sql {
 namespace {
 
 using SteadyClock = std::chrono::steady_clock;
 constexpr auto k_idle = std::chrono::milliseconds(500);
 constexpr auto k_reopen_every = std::chrono::milliseconds(500);
+constexpr auto k_save_every = std::chrono::seconds(30);
 // One commit holds at most so much: a caller with one row should not wait for a flood before it.
 constexpr std::size_t k_group_rows = 20'000;
 constexpr std::size_t k_group_calls = 256;
@@ -15,12 +18,14 @@ constexpr std::uint64_t k_page_bytes = 8192;
 
 }  // namespace
 
-WriteQueue::WriteQueue(std::unique_ptr<SqliteConnection> connection, Open open, Reserve reserve,
-                       Limits limits)
-    : open_(std::move(open)),
+WriteQueue::WriteQueue(std::unique_ptr<SqliteConnection> connection, std::filesystem::path file, Open open,
+                       Reserve reserve, Limits limits)
+    : file_(std::move(file)),
+      open_(std::move(open)),
       reserve_(std::move(reserve)),
       limits_(limits),
       connection_(std::move(connection)),
+      database_(file_),
       thread_("anchord-writer", [this] { run(); }) {}
 
 WriteQueue::~WriteQueue() {
@@ -74,6 +79,7 @@ void WriteQueue::run() {
         // A database that fell away is tried again also when nobody writes, so that readiness comes back by
         // itself.
         if (connection_ == nullptr) ensure_connection();
+        watch_place();
         if (!status().trouble) reserve_.fill();
       });
       const auto shared = shared_.lock();
@@ -93,7 +99,10 @@ void WriteQueue::run() {
       shared->writing_since.reset();
     }
     wake_callers_.notify_all();
-    (void)guarded("database writer", [this] { checkpoint_if(false); });
+    (void)guarded("database writer", [this] {
+      checkpoint_if(false);
+      if (status().trouble) watch_place();
+    });
   }
   connection_.reset();
 }
@@ -138,6 +147,8 @@ void WriteQueue::attempt(Group& group) {
   const auto start = SteadyClock::now();
   if (!ensure_connection())
     throw SqlError(Failure::unavailable, status().trouble ? status().trouble->what() : "closed");
+  if (const auto lost = misplaced())
+    throw *lost;  // outside of the try: the connection has what is to be saved
   std::size_t rows = 0;
   try {
     Query(*connection_, "BEGIN IMMEDIATE").run();
@@ -152,6 +163,8 @@ void WriteQueue::attempt(Group& group) {
     if (!rolled_back_whole() || error.failure() != Failure::full) connection_.reset();
     throw;
   }
+  if (!wal_) wal_.emplace(file_.string() + "-wal");
+  if (const auto lost = misplaced()) throw *lost;  // stored, where nobody finds it: not acknowledged
   auto shared = shared_.lock();
   ++shared->status.commits;
   shared->status.rows += rows;
@@ -202,6 +215,8 @@ bool WriteQueue::ensure_connection() {
     auto connection = open_();
     // A connection opened while the disk was read-only stays so for ever.
     if (connection->read_only_file()) throw SqlError(Failure::unavailable, "database: the file is read-only");
+    wal_.reset();
+    if (const auto lost = misplaced()) throw *lost;
     connection_ = std::move(connection);
     note(std::nullopt);
     return true;
@@ -209,6 +224,38 @@ bool WriteQueue::ensure_connection() {
     note(error);
     return false;
   }
+}
+
+/// What is wrong where a name leads to another file than the one that is open, or to none.
+std::optional<SqlError> WriteQueue::misplaced() {
+  const bool database = !database_.holds();
+  if (!database && (!wal_ || wal_->holds())) return std::nullopt;
+  const std::string name = file_.filename().string() + (database ? "" : "-wal");
+  return SqlError(Failure::unavailable,
+                  "database: " + name +
+                      " was removed, renamed or replaced while it is in use: nothing is "
+                      "stored until the same file is back" +
+                      saved_);
+}
+
+/// Seen also when nobody writes; a file that is back in its place is taken again.
+void WriteQueue::watch_place() {
+  if (connection_ == nullptr) return;
+  if (!misplaced()) {
+    if (!std::exchange(saved_, "").empty()) note(std::nullopt);
+    next_save_ = {};
+    return;
+  }
+  const auto now = SteadyClock::now();
+  if (now >= next_save_) {
+    const auto copy = save_beside(*connection_, file_);
+    saved_ = copy ? ". All that was stored is in " + copy.value().filename().string() +
+                        " beside it: stop anchord, put that copy in its place, start it again"
+                  : ". Do not stop anchord: no copy of what was stored could be made (" +
+                        copy.error().message + ")";
+    next_save_ = copy ? SteadyClock::time_point::max() : now + k_save_every;
+  }
+  note(misplaced());
 }
 
 void WriteQueue::checkpoint_if(bool due) {

@@ -3,12 +3,14 @@
 #include <chrono>
 #include <condition_variable>
 #include <deque>
+#include <filesystem>
 #include <functional>
 #include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "core/base/file_place.hpp"
 #include "core/base/guard.hpp"
 #include "core/base/locked.hpp"
 #include "server/storage/sql.hpp"
@@ -19,7 +21,9 @@ namespace anchord::sql {
 
 /// The one writer: a thread with the only read-write connection. What waits when a commit ends goes into the
 /// next one together (group commit), each call inside a savepoint of its own. Callers wake after the commit,
-/// never before.
+/// never before, and only while the database and its log are the files that their names lead to: where they
+/// were removed, renamed or replaced, nothing more is stored, and what the open connection still has is
+/// copied beside them, once.
 class WriteQueue {
  public:
   struct Limits {
@@ -41,8 +45,9 @@ class WriteQueue {
     std::function<void()> fill;     ///< when nothing is to be written and the last write went well
   };
 
-  /// `open` makes a new connection after a failure.
-  WriteQueue(std::unique_ptr<SqliteConnection> connection, Open open, Reserve reserve, Limits limits);
+  /// `file` is what `connection` has open; `open` makes a new connection to it after a failure.
+  WriteQueue(std::unique_ptr<SqliteConnection> connection, std::filesystem::path file, Open open,
+             Reserve reserve, Limits limits);
   /// Finishes what is queued, checkpoints, closes.
   ~WriteQueue();
 
@@ -77,14 +82,20 @@ class WriteQueue {
   void note(const std::optional<SqlError>& trouble);
   bool ensure_connection();
   void checkpoint_if(bool due);
+  std::optional<SqlError> misplaced();
+  void watch_place();
 
+  const std::filesystem::path file_;
   const Open open_;
   const Reserve reserve_;
   const Limits limits_;
 
   // Of the writer's thread only.
   std::unique_ptr<SqliteConnection> connection_;
-  std::chrono::steady_clock::time_point next_reopen_{};
+  std::chrono::steady_clock::time_point next_reopen_{}, next_save_{};
+  const FilePlace database_;
+  std::optional<FilePlace> wal_;  ///< since the first commit of this connection
+  std::string saved_;             ///< in words, while files are not in their place; empty: not tried yet
 
   Locked<Shared> shared_;
   std::condition_variable wake_writer_, wake_callers_;

@@ -1,5 +1,8 @@
 #include <gtest/gtest.h>
 
+#include <memory>
+#include <vector>
+
 #include "peer.hpp"
 
 // Two links against each other over real sockets.
@@ -81,6 +84,43 @@ TEST(ListenLink, ServesTheNewestPeerAndLetsTheOldOneGo) {
   EXPECT_FALSE(server.why) << "it goes on listening";
   Seen third(made(io, at_port("tcp://", server)));
   ASSERT_TRUE(run_until(io, [&] { return server.opens == 3; }));
+}
+
+/// Whoever can reach the port of an aircraft must not be able to cut it off by connecting.
+TEST(ListenLink, KeepsItsPeerAgainstConnectionsWhoseBytesAreNotWelcome) {
+  boost::asio::io_context io;
+  const auto link = make_link(io, parse_address("tcp-listen://:0").value(), {});
+  std::string in;
+  int opens = 0;
+  LinkHandlers handlers;
+  handlers.on_open = [&] { ++opens; };
+  handlers.on_bytes = [&](std::string_view bytes, const Arrival&) { in += bytes; };
+  handlers.welcome = [](std::string_view bytes, const std::string& sender, const Arrival&) {
+    EXPECT_TRUE(sender.starts_with("127.0.0.1:")) << sender;
+    return bytes.starts_with("friend");
+  };
+  link->open(std::move(handlers));
+  const std::string there = "tcp://127.0.0.1:" + std::to_string(link->port());
+  Seen first(made(io, there));
+  ASSERT_TRUE(run_until(io, [&] { return first.opens == 1; }));
+  ASSERT_TRUE(first.link->write("friend 1"));
+  ASSERT_TRUE(run_until(io, [&] { return in == "friend 1" && opens == 1; }));
+  std::vector<std::unique_ptr<Seen>> strangers;
+  for (int i = 0; i < 20; ++i) {
+    strangers.push_back(std::make_unique<Seen>(made(io, there)));
+    ASSERT_TRUE(run_until(io, [&] { return strangers.back()->opens == 1; }));
+    ASSERT_TRUE(strangers.back()->link->write("stranger"));
+  }
+  ASSERT_TRUE(run_until(io, [&] { return strangers.front()->why.has_value(); })) << "they are bounded";
+  ASSERT_TRUE(link->write("for the friend"));
+  ASSERT_TRUE(run_until(io, [&] { return first.text == "for the friend"; }));
+  EXPECT_FALSE(first.why);
+  EXPECT_EQ(in, "friend 1");
+  EXPECT_EQ(strangers.back()->text, "");
+  Seen again(made(io, there));
+  ASSERT_TRUE(run_until(io, [&] { return again.opens == 1; }));
+  ASSERT_TRUE(again.link->write("friend 2"));
+  ASSERT_TRUE(run_until(io, [&] { return in == "friend 1friend 2" && opens == 2 && first.why.has_value(); }));
 }
 
 TEST(ListenLink, SaysThatThePortIsTaken) {

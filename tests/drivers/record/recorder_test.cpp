@@ -138,6 +138,46 @@ TEST(Recorder, ADiskThatIsGoneIsToldAndForgottenWhenItIsBack) {
   EXPECT_EQ(recorder->events_lost(), 0U);
 }
 
+// A file that was removed takes what is written, and nobody finds it.
+TEST(Recorder, BeginsANewPartWhenThatOfNowIsTakenAwayAlsoWithItsFolder) {
+  const Folder folder;
+  RecorderOptions options;
+  options.sync_every_ms = 1;
+  const auto recorder = Recorder::open(folder.path, k_start, options).value();
+  std::int64_t n = 0;
+  const auto record_until_it_moves_on_from = [&](const fs::path& part) {
+    for (const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(20);
+         recorder->file() == part && std::chrono::steady_clock::now() < end; ++n)
+      recorder->take({EventKind::bytes, 3, {UtcTime{n}, n}, "a chunk of bytes"});
+    return recorder->file();
+  };
+  const auto first = recorder->file();
+  fs::rename(first, first.string() + ".mine");
+  const auto second = record_until_it_moves_on_from(first);
+  EXPECT_NE(second, first);
+  fs::remove_all(folder.path);
+  const auto third = record_until_it_moves_on_from(second);
+  EXPECT_NE(third, second);
+  recorder->take({EventKind::bytes, 3, {UtcTime{n}, n}, "the last chunk"});
+  EXPECT_NE(slurp(third).find("the last chunk"), std::string::npos);
+  EXPECT_EQ(recorder->events_lost(), 0U);
+}
+
+// Raw bytes are ten times the rows that are made of them, and the first to give way.
+TEST(Recorder, LeavesTheLastOfTheDiskToTheRows) {
+  const Folder folder;
+  RecorderOptions options;
+  options.sync_every_ms = 1;
+  options.keep_free_bytes = std::uint64_t{1} << 60;
+  const auto recorder = Recorder::open(folder.path, k_start, options).value();
+  std::int64_t n = 0;
+  for (const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(20);
+       recorder->failed().empty() && std::chrono::steady_clock::now() < end; ++n)
+    recorder->take({EventKind::bytes, 3, {UtcTime{n}, n}, "a chunk of bytes"});
+  EXPECT_NE(recorder->failed().find("MiB free on the disk, which rows need"), std::string::npos);
+  EXPECT_GT(recorder->events_lost(), 0U);
+}
+
 TEST(Recorder, TurnsToANewPartThatTellsTheDevicesAgain) {
   const Folder folder;
   RecorderOptions options;

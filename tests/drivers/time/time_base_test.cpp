@@ -76,5 +76,41 @@ TEST(TimeBase, ASecondReceiverDoesNotDisturbTheFirst) {
   EXPECT_NEAR(static_cast<double>(base.utc_of(120 * k_s).time.ns - (k_epoch + 120 * k_s)), 0, 1e5);
 }
 
+/// A receiver of which the week was wrong was taken away, and its successor never followed: every range of
+/// the flights of that day was stamped 1024 weeks early. A rover whose settings are changed is another one
+/// too.
+TEST(TimeBase, AnotherReceiverTakesOverOnceTheFirstWasRemoved) {
+  TimeBase base;
+  const std::int64_t wrong = 1024LL * 7 * 86'400 * k_s;
+  for (int i = 0; i < 15; ++i)
+    base.receiver_said(1, UtcTime{k_epoch + (100 + i) * k_s - wrong}, at((100 + i) * k_s), 0);
+  ASSERT_EQ(base.source(), TimeSource::receiver);
+  base.receiver_gone(1);
+  EXPECT_EQ(base.utc_of(116 * k_s).time.ns, k_epoch + 116 * k_s - wrong) << "there is no other yet";
+  for (int i = 20; i < 35; ++i)
+    base.receiver_said(2, UtcTime{k_epoch + (100 + i) * k_s}, at((100 + i) * k_s), 0);
+  EXPECT_NEAR(static_cast<double>(base.utc_of(136 * k_s).time.ns - (k_epoch + 136 * k_s)), 0, 1e5);
+  EXPECT_FALSE(base.skew());
+}
+
+TEST(TimeBase, AnotherReceiverTakesOverFromOneThatFellSilentForHalfAMinuteAndNotFromOneThatComesBack) {
+  const std::int64_t off = 999 * k_s;
+  const auto after_silence_of = [&](int silence_s, bool comes_back) {
+    TimeBase base;
+    for (int i = 0; i < 15; ++i)
+      base.receiver_said(1, UtcTime{k_epoch + (100 + i) * k_s}, at((100 + i) * k_s), 0);
+    for (int i = 15; i < 15 + silence_s; ++i)
+      base.receiver_said(2, UtcTime{k_epoch + (100 + i) * k_s + off}, at((100 + i) * k_s), 0);
+    for (int i = 15 + silence_s; comes_back && i < 30 + silence_s; ++i) {
+      base.receiver_said(1, UtcTime{k_epoch + (100 + i) * k_s}, at((100 + i) * k_s), 0);
+      base.receiver_said(2, UtcTime{k_epoch + (100 + i) * k_s + off}, at((100 + i) * k_s), 0);
+    }
+    return (base.utc_of(200 * k_s).time.ns - (k_epoch + 200 * k_s) + k_s / 2) / k_s;
+  };
+  EXPECT_EQ(after_silence_of(25, false), 0) << "a link that was lost for a while";
+  EXPECT_EQ(after_silence_of(45, false), 999);
+  EXPECT_EQ(after_silence_of(35, true), 0) << "it came back before the other's ten seconds were heard";
+}
+
 }  // namespace
 }  // namespace anchord::timing

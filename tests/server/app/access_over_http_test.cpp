@@ -84,9 +84,9 @@ TEST(Tokens, TellWhenTheyWereLastUsed) {
 TEST(Addresses, ThatAreMistypedGetAProblemAndNoPage) {
   AppFixture server(Settings{{"rate.burst", "1000"}});
   ASSERT_TRUE(server.app) << server.error.message;
-  for (const char* path :
-       {"/api/v1/missions/x/", "//api/v1/missions", "/api//v1/missions", "/api/v1/nothing",
-        "/api/v2/missions", "/api", "/ogc/nothing", "/metrics/", "/healthz/x", "/live//x"}) {
+  for (const char* path : {"/api/v1/missions/x/", "//api/v1/missions", "/api//v1/missions", "/api/v1/nothing",
+                           "/api/v2/missions", "/api", "/ogc/nothing", "/metrics/", "/healthz/x", "/live//x",
+                           "/API/v1/missions", "/Healthz"}) {
     const auto answer = server.call("GET", path, {}, server.bearer(server.admin));
     EXPECT_EQ(answer.status, 404) << path;
     EXPECT_EQ(answer.headers.at("content-type"), "application/problem+json") << path;

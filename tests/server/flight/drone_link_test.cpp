@@ -4,6 +4,7 @@
 #include "server/flight/drone_link.hpp"
 
 #include <arpa/inet.h>
+#include <fcntl.h>
 #include <gtest/gtest.h>
 #include <sys/socket.h>
 #include <unistd.h>
@@ -143,13 +144,14 @@ void fly(const std::string& address, Aircraft& aircraft) {
 /// An autopilot that says who it is from a UDP socket of its own.
 class Sender {
  public:
-  explicit Sender(std::uint16_t to, std::uint8_t system)
-      : socket_(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0)), packer_({system, 1}) {
+  explicit Sender(std::uint16_t to, std::uint8_t system, int type = SOCK_DGRAM)
+      : socket_(::socket(AF_INET, type | SOCK_CLOEXEC, 0)), packer_({system, 1}) {
     to_.sin_family = AF_INET;
     to_.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
     to_.sin_port = htons(to);
     EXPECT_EQ(::connect(socket_, reinterpret_cast<const sockaddr*>(&to_), sizeof to_),
               0);  // it has a port now
+    EXPECT_EQ(::fcntl(socket_, F_SETFL, O_NONBLOCK), 0);
   }
   ~Sender() { ::close(socket_); }
   /// As the server sees it, once something was sent.
@@ -162,7 +164,7 @@ class Sender {
   void beat() {
     const auto frame =
         packer_.pack(mavlink::Message("HEARTBEAT").set("type", 2).set("autopilot", 3).set("custom_mode", 4));
-    (void)::send(socket_, frame.data(), frame.size(), 0);
+    (void)::send(socket_, frame.data(), frame.size(), MSG_NOSIGNAL);
   }
   /// Datagrams of the server that came here.
   std::size_t heard() {
@@ -205,6 +207,17 @@ std::uint16_t free_port() {
   return ntohs(at.sin_port);
 }
 
+bool somebody_listens_at(std::uint16_t port) {
+  const int probe = ::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
+  sockaddr_in at{};
+  at.sin_family = AF_INET;
+  at.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  at.sin_port = htons(port);
+  const bool taken = ::connect(probe, reinterpret_cast<const sockaddr*>(&at), sizeof at) == 0;
+  ::close(probe);
+  return taken;
+}
+
 TEST(DroneLink, ADatagramOfAStrangerTakesNothingOverUdp) {
   const auto port = free_port();
   auto opened = DroneLink::open("udp://:" + std::to_string(port), {});
@@ -224,6 +237,33 @@ TEST(DroneLink, ADatagramOfAStrangerTakesNothingOverUdp) {
   EXPECT_EQ(link.status().identity.peer, peer);
   link.change_peer(link.status().others.front().sender);
   ASSERT_TRUE(until([&] { return stranger.beat(), stranger.heard() > 0; }, 10)) << "a person changed it";
+}
+
+/// The newest connection took the link, and with it the aircraft in the air.
+TEST(DroneLink, AStrangerWhoConnectsToItsTcpPortTakesNothingAndTheAircraftMayComeBackAtOnce) {
+  const auto port = free_port();
+  auto opened = DroneLink::open("tcp-listen://127.0.0.1:" + std::to_string(port), {});
+  ASSERT_TRUE(opened) << opened.error().message;
+  auto& link = *opened.value();
+  link.start();
+  const auto is_peer = [&](Sender& one) {
+    return until([&] { return one.beat(), link.status().identity.peer == one.address(); }, 5);
+  };
+  ASSERT_TRUE(until([&] { return somebody_listens_at(port); }, 5));
+  auto aircraft = std::make_unique<Sender>(port, 1, SOCK_STREAM);
+  ASSERT_TRUE(is_peer(*aircraft));
+  {
+    Sender stranger(port, 1, SOCK_STREAM);
+    ASSERT_TRUE(until([&] { return stranger.beat(), !link.status().others.empty(); }, 5));
+    const auto before = aircraft->heard();
+    (void)link.land();
+    ASSERT_TRUE(until([&] { return aircraft->heard() > before; }, 5)) << "the command goes to the aircraft";
+    EXPECT_EQ(stranger.heard(), 0u);
+    EXPECT_EQ(link.status().identity.peer, aircraft->address());
+  }
+  aircraft.reset();
+  Sender again(port, 1, SOCK_STREAM);
+  EXPECT_TRUE(is_peer(again)) << "its connection was closed: nobody waits for ten seconds of silence";
 }
 
 TEST(DroneLink, AStrangerWhoIsHeardFirstDoesNotTakeAFlightThatGoesOn) {

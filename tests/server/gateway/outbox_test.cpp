@@ -85,6 +85,21 @@ TEST(GatewayOutbox, RefusesWhatComesWhenItIsFullAndTakesAgainWhenRowsHaveLeft) {
   EXPECT_TRUE(outbox->keep({batch(k_first, body)}));
 }
 
+TEST(GatewayOutbox, KeepsNothingMoreOnceItsFileWasRemovedAndSavesWhatItHad) {
+  ScratchDir dir;
+  const auto file = dir.path() / "outbox.db";
+  {
+    const auto outbox = opened(dir.path());
+    ASSERT_TRUE(outbox->keep({batch(k_first, "a\n")}));
+    for (const char* part : {"", "-wal", "-shm"}) std::filesystem::remove(file.string() + part);
+    const auto refused = outbox->keep({batch(k_first, "b\n")});
+    ASSERT_FALSE(refused);
+    EXPECT_EQ(refused.error().code, Errc::storage_unavailable);
+  }
+  std::filesystem::rename(file.string() + ".saved-1", file);
+  EXPECT_EQ(bodies(opened(dir.path())->newest(0, 100).value().batches), (Texts{"a\n"}));
+}
+
 TEST(GatewayOutbox, SendsRowsWithoutAMissionOnlyOnceTheyHaveOne) {
   ScratchDir dir;
   const auto outbox = opened(dir.path());

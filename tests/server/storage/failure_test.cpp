@@ -93,6 +93,13 @@ TEST_F(StorageFailure, RefusesASecondInstanceAndNamesTheFirst) {
   EXPECT_THAT(error.message, HasSubstr(std::to_string(::getpid())));
 }
 
+/// A lock file looks left over, and people delete those.
+TEST_F(StorageFailure, RefusesASecondInstanceAlsoWhenTheLockFileWasDeleted) {
+  const auto first = open();
+  ASSERT_TRUE(std::filesystem::remove(options_.data_dir / "anchord.lock"));
+  EXPECT_EQ(open_error().code, Errc::conflict);
+}
+
 TEST_F(StorageFailure, KeepsItsFilesFromOtherUsers) {
   filled(1);
   struct stat info {};
@@ -286,6 +293,60 @@ TEST_F(StorageFailure, AnswersUnavailableWhileAnotherProcessHoldsTheLockAndRecov
   } while (!taken && std::chrono::steady_clock::now() < deadline);
   EXPECT_TRUE(taken);
   EXPECT_EQ(db->health().level, StorageLevel::ok);
+}
+
+/// SQLite goes on writing to a file that was taken away, without an error: rows would be acknowledged that
+/// nobody finds again.
+TEST_F(StorageFailure, AcknowledgesNothingOnceItsFileWasRemovedAndSavesWhatItHad) {
+  MissionId mission;
+  {
+    const auto db = open();
+    mission = mission_in(*db).id;
+    ASSERT_TRUE(db->stores().measurements.append_ranges(batch(mission, 0, 50), false));
+    for (const char* part : {"", "-wal", "-shm"}) std::filesystem::remove(file().string() + part);
+    const auto refused = db->stores().measurements.append_ranges(batch(mission, 50, 50), false);
+    ASSERT_FALSE(refused);
+    EXPECT_EQ(refused.error().code, Errc::storage_unavailable);
+    EXPECT_THAT(refused.error().message, HasSubstr("anchord.db was removed, renamed or replaced"));
+    EXPECT_FALSE(db->health().writable());
+  }
+  const std::filesystem::path saved = file().string() + ".saved-1";
+  const Error missing = open_error();
+  EXPECT_THAT(missing.message, HasSubstr("anchord backup restore '" + saved.string() + "'"));
+  ASSERT_TRUE(restore_backup(options_.data_dir, saved));
+  EXPECT_EQ(open()->stores().measurements.count_ranges(rows_of(mission)).value(), 50U);
+}
+
+TEST_F(StorageFailure, NoticesAFileThatWasReplacedAlsoWhenNobodyWritesAndGoesOnWhenItIsBack) {
+  const auto db = open();
+  const auto mission = mission_in(*db);
+  ASSERT_TRUE(db->stores().measurements.append_ranges(batch(mission.id, 0, 5), false));
+  const auto until = [&](StorageLevel level) {
+    const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(30);
+    while (db->health().level != level && std::chrono::steady_clock::now() < deadline)
+      std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    return db->health().level == level;
+  };
+  const std::filesystem::path aside = options_.data_dir / "aside.db", copy = options_.data_dir / "copy.db";
+  ASSERT_TRUE(db->backup(copy));
+  std::filesystem::rename(file(), aside);
+  std::filesystem::rename(copy, file());
+  EXPECT_TRUE(until(StorageLevel::unavailable));
+  EXPECT_FALSE(db->backup(options_.data_dir / "of_another.db")) << "the file of that name is another";
+  std::filesystem::rename(aside, file());
+  EXPECT_TRUE(until(StorageLevel::ok));
+  EXPECT_TRUE(db->stores().measurements.append_ranges(batch(mission.id, 5, 5), false));
+  EXPECT_EQ(db->stores().measurements.count_ranges(rows_of(mission.id)).value(), 10U);
+}
+
+/// Until the next checkpoint the newest commits are in the log alone.
+TEST_F(StorageFailure, AcknowledgesNothingOnceItsLogWasRemoved) {
+  const auto db = open();
+  const auto mission = mission_in(*db);
+  ASSERT_TRUE(std::filesystem::remove(file().string() + "-wal"));
+  const auto refused = db->stores().measurements.append_ranges(batch(mission.id, 0, 5), false);
+  ASSERT_FALSE(refused);
+  EXPECT_THAT(refused.error().message, HasSubstr("anchord.db-wal was removed, renamed or replaced"));
 }
 
 /// Nothing fails while a disk hangs, so nothing but time tells of it.
