@@ -13,8 +13,21 @@ namespace {
 
 constexpr std::size_t k_least_levels = 30;
 constexpr double k_outline_believed = 4.0;  // sigmas; odds of 3000 to 1
+constexpr double k_clue_believed = 3.0;     // sigmas; by chance one in 370 is further off
 
 double wrapped(double angle_rad) { return std::remainder(angle_rad, 2.0 * std::numbers::pi); }
+
+/// A bearing or a height comes from the peak of a level, and a wall or the edge of a roof makes peaks of its
+/// own, metres off. Beyond some sigmas the cost grows by the logarithm alone: it pulls the less the more the
+/// ranges contradict it, and still decides between two places that the ranges leave open. Cost and gradient
+/// are those of the half square of the row that is returned.
+PriorRow doubted(const PriorRow& row) {
+  const double sigmas = std::abs(row.missing);
+  if (sigmas <= k_clue_believed) return row;
+  constexpr double squared = k_clue_believed * k_clue_believed;
+  const double size = std::sqrt(squared + 2.0 * squared * std::log(sigmas / k_clue_believed));
+  return {row.slope * (squared / sigmas / size), std::copysign(size, row.missing)};
+}
 
 double bearing_of(const Eigen::Vector3d& from, const Eigen::Vector3d& to) {
   return std::atan2(to.x() - from.x(), to.y() - from.y());
@@ -51,11 +64,11 @@ std::array<PriorRow, 3> prior_rows(const AnchorPriors& priors, std::span<const E
   if (const auto& b = priors.bearing) {
     const Eigen::Vector2d way = (place_m - b->tag_m).head<2>();
     const double far2 = std::max(way.squaredNorm(), 1.0);  // right above there is no bearing to speak of
-    rows[0] = {Eigen::Vector3d(way.y(), -way.x(), 0) / (far2 * b->sigma_rad),
-               wrapped(b->bearing_rad - bearing_of(b->tag_m, place_m)) / b->sigma_rad};
+    rows[0] = doubted({Eigen::Vector3d(way.y(), -way.x(), 0) / (far2 * b->sigma_rad),
+                       wrapped(b->bearing_rad - bearing_of(b->tag_m, place_m)) / b->sigma_rad});
   }
   if (const auto& h = priors.height)
-    rows[1] = {Eigen::Vector3d::UnitZ() / h->sigma_m, (h->up_m - place_m.z()) / h->sigma_m};
+    rows[1] = doubted({Eigen::Vector3d::UnitZ() / h->sigma_m, (h->up_m - place_m.z()) / h->sigma_m});
   Eigen::Vector2d away(0, 0);
   const double outside = outside_m(outline_m, place_m.head<2>(), &away);
   const double sigmas = outside / outline_sigma_m;

@@ -6,7 +6,6 @@
 #include <cmath>
 #include <iterator>
 #include <limits>
-#include <map>
 
 #include "core/geo/enu.hpp"
 #include "core/planning/bounds.hpp"
@@ -186,25 +185,6 @@ FlightData fly_ring(const sim::World& world, double duration_s, const std::vecto
     for (auto& range : measured.ranges) data.ranges.push_back(std::move(range));
   }
   for (const auto& anchor : world.anchors) data.anchor_names[anchor.id] = to_string(anchor.id);
-  return data;
-}
-
-FlightData thinned_at_rest(FlightData data) {
-  constexpr double k_step_m = 0.3;
-  if (data.fixes.empty()) return data;
-  const EnuFrame frame(data.fixes.front().position);
-  std::map<NetworkId, Eigen::Vector3d> kept_at_m;
-  std::vector<Range> kept;
-  std::size_t next = 0;  // both are in order of time
-  for (auto& range : data.ranges) {
-    while (next + 1 < data.fixes.size() && data.fixes[next].time < range.time) ++next;
-    const Eigen::Vector3d here_m = frame.enu_from_wgs84(data.fixes[next].position).m;
-    const auto before = kept_at_m.find(range.anchor);
-    if (before != kept_at_m.end() && (before->second - here_m).norm() < k_step_m) continue;
-    kept_at_m[range.anchor] = here_m;
-    kept.push_back(std::move(range));
-  }
-  data.ranges = std::move(kept);
   return data;
 }
 

@@ -61,11 +61,6 @@ Result<ClosedLoopResult> fly_closed_loop(const sim::World& world, const Plan& pl
 FlightData fly_ring(const sim::World& world, double duration_s, const std::vector<double>& heights_m,
                     const ClosedLoopOptions& options);
 
-/// At most one range of each anchor per 0.3 m of the tag's way: a hundred ranges at one spot share one error
-/// of walls and rover, and would outvote the rest (the dissertation takes the mean per measuring
-/// point, 6.2.1).
-FlightData thinned_at_rest(FlightData data);
-
 /// How an answer stands to the truth.
 struct AnchorError {
   NetworkId anchor{};

@@ -8,6 +8,7 @@
 
 #include "core/localize/flight_solver.hpp"
 #include "core/localize/turn.hpp"
+#include "tests/core/localize/flight_support.hpp"
 
 namespace anchord {
 namespace {
@@ -118,6 +119,24 @@ TEST(OneHeight, IsDecidedByTheHeightSearch) {
   EXPECT_LT((after.best->position.m - anchor).norm(), 0.5) << after.best->position.m.transpose();
   EXPECT_EQ(after.verdict, Verdict::ok) << after.reason;
   EXPECT_FALSE(after.mirror);
+}
+
+// A wall or the edge of a roof makes peaks of the level that no antenna makes: simulated height searches were
+// 6 m off, and took the anchor with them by up to 5.6 m.
+TEST(AllRound, TheRangesOverruleAHeightSearchThatIsMetresOff) {
+  testing::MadeFlight made;
+  made.duration_s = 40;
+  made.noise_m = 0.15;
+  const FlightData flight = testing::make_flight(made);
+  const auto high_m = [&](const FlightOptions& options) {
+    const auto solution = solve_flight(flight, options);
+    const auto& first = solution.value().anchors.front().estimate;
+    return first.best->position.m.z();
+  };
+  const NetworkId first = solve_flight(flight).value().anchors.front().estimate.anchor;
+  FlightOptions options;
+  options.priors[first].height = {made.anchors.front().z() + 6, 0.54};
+  EXPECT_NEAR(high_m(options), high_m({}), 0.1);
 }
 
 }  // namespace

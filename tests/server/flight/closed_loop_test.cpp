@@ -50,7 +50,7 @@ Row fly(const sim::World& world, std::uint64_t seed) {
   FlightOptions solve;
   solve.origin = world.origin;
   solve.priors = result.priors;
-  const auto solution = solve_flight(thinned_at_rest(result.data), solve);
+  const auto solution = solve_flight(result.data, solve);
   EXPECT_TRUE(solution.has_value());
   const auto judged = assess(world, solution.value());
   row.median_m = median_error_m(judged);
@@ -60,8 +60,7 @@ Row fly(const sim::World& world, std::uint64_t seed) {
     row.inside += j.inside;
   }
   const auto rival = [&](const std::vector<double>& heights_m) {
-    const auto solved =
-        solve_flight(thinned_at_rest(fly_ring(world, result.flight_s, heights_m, options)), solve);
+    const auto solved = solve_flight(fly_ring(world, result.flight_s, heights_m, options), solve);
     return solved ? median_error_m(assess(world, solved.value())) : std::numeric_limits<double>::infinity();
   };
   row.ring_m = rival({4});
@@ -75,7 +74,7 @@ double median_of(std::vector<double> values) {
 }
 
 struct Table {
-  double median_m{}, ring_m{}, rings_m{};
+  double median_m{}, worst_m{}, ring_m{}, rings_m{};
   int anchors{}, ok{}, inside{};
 };
 Table fly_seeds(const char* name, const sim::World& world, std::uint64_t n) {
@@ -97,12 +96,13 @@ Table fly_seeds(const char* name, const sim::World& world, std::uint64_t n) {
     out.anchors += 6;
     out.ok += r.ok;
     out.inside += r.inside;
+    out.worst_m = std::max(out.worst_m, r.worst_m);
   }
   out.median_m = median_of(medians);
   out.ring_m = median_of(rings);
   out.rings_m = median_of(two_rings);
-  std::printf("all: %d of %d ok, %d inside, median %.3f m, ring %.3f m, two rings %.3f m\n", out.ok,
-              out.anchors, out.inside, out.median_m, out.ring_m, out.rings_m);
+  std::printf("all: %d of %d ok, %d inside, median %.4f m, worst %.3f m, ring %.3f m, two rings %.3f m\n",
+              out.ok, out.anchors, out.inside, out.median_m, out.worst_m, out.ring_m, out.rings_m);
   return out;
 }
 
@@ -112,28 +112,25 @@ std::uint64_t seeds() {
   return text != nullptr ? std::strtoull(text, nullptr, 10) : 1;
 }
 
-TEST(ClosedLoop, FindsEveryAnchorThroughWindowsFromTheOutlineAlone) {
-  const auto table = fly_seeds("windows", sim::demonstration_world(), seeds());
+/// What every flight must hold, and what twenty must: one flight is a throw of the dice, and over twenty the
+/// plan also beats rings whose heights a person chose well.
+void expect_found(const Table& table, double one_median_m, double all_median_m) {
   EXPECT_EQ(table.ok, table.anchors);
-  EXPECT_LT(table.median_m, 0.05);
+  EXPECT_EQ(table.inside, table.anchors);
+  EXPECT_LT(table.worst_m, 0.2);
+  EXPECT_LT(table.median_m, one_median_m);
   EXPECT_LT(table.median_m, table.ring_m);
-  // One flight is a throw of the dice; over twenty the plan also beats rings whose heights a person chose
-  // well.
-  if (seeds() >= 20) {
-    EXPECT_LT(table.median_m, table.rings_m);
-  }
+  if (seeds() < 20) return;
+  EXPECT_LT(table.median_m, all_median_m);
+  EXPECT_LT(table.median_m, table.rings_m);
+}
+
+TEST(ClosedLoop, FindsEveryAnchorThroughWindowsFromTheOutlineAlone) {
+  expect_found(fly_seeds("windows", sim::demonstration_world(), seeds()), 0.05, 0.04);
 }
 
 TEST(ClosedLoop, FindsEveryAnchorThroughWallsFromTheOutlineAlone) {
-  const auto table = fly_seeds("walls", walled_world(), seeds());
-  EXPECT_EQ(table.ok, table.anchors);
-  EXPECT_LT(table.median_m, 0.10);
-  EXPECT_LT(table.median_m, table.ring_m);
-  // One flight is a throw of the dice; over twenty the plan also beats rings whose heights a person chose
-  // well.
-  if (seeds() >= 20) {
-    EXPECT_LT(table.median_m, table.rings_m);
-  }
+  expect_found(fly_seeds("walls", walled_world(), seeds()), 0.06, 0.05);
 }
 
 /// Only the south front may be flown along, in one upright plane, as in a street: what is inside and its
@@ -168,10 +165,9 @@ TEST(ClosedLoop, AFlightAlongOneFrontKnowsTheSideFromItsTurn) {
   EXPECT_GE(result.priors.size(), 4u);
   FlightOptions options;
   options.origin = world.origin;
-  const auto data = thinned_at_rest(result.data);
-  const auto blind = solve_flight(data, options);
+  const auto blind = solve_flight(result.data, options);
   options.priors = result.priors;
-  const auto told = solve_flight(data, options);
+  const auto told = solve_flight(result.data, options);
   ASSERT_TRUE(blind && told);
   // In doubt, or on the wrong side without a doubt.
   const auto open = [](const Estimate& e) {

@@ -54,7 +54,7 @@ TEST(PilotedLoop, LandsAtHomeClearOfTheBuildingAndFindsTheAnchorsWithEverythingO
     FlightOptions solve;
     solve.origin = world.origin;
     solve.priors = r.priors;
-    const auto solution = solve_flight(thinned_at_rest(r.data), solve);
+    const auto solution = solve_flight(r.data, solve);
     ASSERT_TRUE(solution) << "seed " << seed << ": " << r.state.reason;
     const auto judged = assess(world, solution.value());
     double worst_m = 0;
