@@ -1,24 +1,17 @@
 #include "core/procedure/exit_rule.hpp"
 
-#include <array>
-#include <cstdio>
+#include "core/procedure/sentence.hpp"
 
 namespace anchord::procedure {
 namespace {
 
-std::string text(const char* format, double a, double b) {
-  std::array<char, 128> out{};
-  std::snprintf(out.data(), out.size(), format, a, b);
-  return out.data();
-}
-
 std::optional<std::string> goal(const ExitRule& rule, const Progress& now) {
   if (now.iterations < rule.min_iterations) return std::nullopt;
   if (rule.target_sigma_m && now.sigma_m && *now.sigma_m <= *rule.target_sigma_m) {
-    return text("accuracy reached: %.3f m, wanted %.3f m", *now.sigma_m, *rule.target_sigma_m);
+    return sentence("accuracy reached: %.3f m, wanted %.3f m", *now.sigma_m, *rule.target_sigma_m);
   }
   if (rule.gdop_root && now.gdop_root && *now.gdop_root <= *rule.gdop_root) {
-    return text("GDOP (root) reached: %.3f, wanted %.3f", *now.gdop_root, *rule.gdop_root);
+    return sentence("GDOP (root) reached: %.3f, wanted %.3f", *now.gdop_root, *rule.gdop_root);
   }
   return std::nullopt;
 }
@@ -28,16 +21,16 @@ std::optional<std::string> goal(const ExitRule& rule, const Progress& now) {
 std::optional<Exit> exit_of(const ExitRule& rule, const Progress& now) {
   const auto reached = goal(rule, now);
   if (now.battery && *now.battery <= rule.min_battery) {
-    return Exit{reached.has_value(),
-                text("battery at %.0f %%, return at %.0f %%", 100 * *now.battery, 100 * rule.min_battery)};
+    return Exit{reached.has_value(), sentence("battery at %.0f %%, return at %.0f %%", 100 * *now.battery,
+                                              100 * rule.min_battery)};
   }
   if (reached) return Exit{true, *reached};
   if (rule.max_s && now.elapsed_s >= *rule.max_s) {
-    return Exit{false, text("time over: %.0f s of %.0f s", now.elapsed_s, *rule.max_s)};
+    return Exit{false, sentence("time over: %.0f s of %.0f s", now.elapsed_s, *rule.max_s)};
   }
   if (now.iterations >= rule.max_iterations) {
-    return Exit{false, text("%.0f of %.0f points measured without reaching the goal", now.iterations,
-                            rule.max_iterations)};
+    return Exit{false, sentence("%.0f of %.0f points measured without reaching the goal", now.iterations,
+                                rule.max_iterations)};
   }
   return std::nullopt;
 }

@@ -1,18 +1,12 @@
 #include "core/procedure/safety.hpp"
 
-#include <array>
 #include <cmath>
-#include <cstdio>
 #include <limits>
+
+#include "core/procedure/sentence.hpp"
 
 namespace anchord::procedure {
 namespace {
-
-std::string text(const char* format, double a, double b = 0) {
-  std::array<char, 160> out{};
-  std::snprintf(out.data(), out.size(), format, a, b);
-  return out.data();
-}
 
 /// The rule that a point breaks, in the operator's words and with the numbers.
 std::string explain(const planning::Bounds& bounds, planning::Refusal refusal, const Eigen::Vector3d& at_m) {
@@ -20,8 +14,8 @@ std::string explain(const planning::Bounds& bounds, planning::Refusal refusal, c
   switch (refusal) {
     case Refusal::outside_fence:
       return at_m.allFinite() && bounds.fence.size() >= 3
-                 ? text("%.1f m outside the fence",
-                        planning::distance_to_edge_m(bounds.fence, at_m.head<2>()))
+                 ? sentence("%.1f m outside the fence",
+                            planning::distance_to_edge_m(bounds.fence, at_m.head<2>()))
                  : "outside the fence";
     case Refusal::no_fly: {
       double nearest_m = std::numeric_limits<double>::infinity();
@@ -30,14 +24,15 @@ std::string explain(const planning::Bounds& bounds, planning::Refusal refusal, c
         if (area.size() >= 3)
           nearest_m = std::min(nearest_m, planning::distance_to_edge_m(area, at_m.head<2>()));
       }
-      return text("%.1f m from the building or a no-fly area, %.1f m are kept", nearest_m, bounds.keep_out_m);
+      return sentence("%.1f m from the building or a no-fly area, %.1f m are kept", nearest_m,
+                      bounds.keep_out_m);
     }
     case Refusal::near_wall:
       return "too near to a wall";
     case Refusal::too_low:
-      return text("%.1f m high, the band begins at %.1f m", at_m.z(), bounds.min_height_m.value_or(0));
+      return sentence("%.1f m high, the band begins at %.1f m", at_m.z(), bounds.min_height_m.value_or(0));
     case Refusal::too_high:
-      return text("%.1f m high, the band ends at %.1f m", at_m.z(), bounds.max_height_m.value_or(0));
+      return sentence("%.1f m high, the band ends at %.1f m", at_m.z(), bounds.max_height_m.value_or(0));
     case Refusal::path_blocked:
       return "the straight way crosses the building, a no-fly area or the fence";
     case Refusal::visited:
@@ -65,15 +60,15 @@ std::optional<Alarm> breach(const SafetyLimits& limits, const Eigen::Vector3d& a
   if (*refusal == planning::Refusal::outside_fence) {
     const double out_m = planning::distance_to_edge_m(limits.bounds.fence, at_m.head<2>());
     if (out_m <= limits.tolerance_m && at_m.allFinite()) return std::nullopt;
-    return Alarm{Reaction::hold, false, "fence.breach", text("%.1f m outside the fence", out_m)};
+    return Alarm{Reaction::hold, false, "fence.breach", sentence("%.1f m outside the fence", out_m)};
   }
   if (*refusal == planning::Refusal::too_high) {
     return Alarm{
         Reaction::hold, false, "fence.breach",
-        text("%.1f m high, the band ends at %.1f m", at_m.z(), limits.bounds.max_height_m.value_or(0))};
+        sentence("%.1f m high, the band ends at %.1f m", at_m.z(), limits.bounds.max_height_m.value_or(0))};
   }
   return Alarm{Reaction::hold, false, "fence.breach",
-               text("nearer than %.1f m to the building or a no-fly area", limits.bounds.keep_out_m)};
+               sentence("nearer than %.1f m to the building or a no-fly area", limits.bounds.keep_out_m)};
 }
 
 }  // namespace
@@ -82,7 +77,7 @@ std::optional<std::string> refuse_standing(const SafetyLimits& limits, const Eig
                                            std::string_view what) {
   const auto floor_m = limits.bounds.min_height_m;
   if (floor_m && at_m.z() < *floor_m - limits.floor_tolerance_m)
-    return std::string(what) + text(" %.1f m high, the band begins at %.1f m", at_m.z(), *floor_m);
+    return std::string(what) + sentence(" %.1f m high, the band begins at %.1f m", at_m.z(), *floor_m);
   if (!breach(limits, at_m)) return std::nullopt;
   const auto refusal = planning::refuse_point(widened(limits), at_m);
   return std::string(what) + ' ' + explain(limits.bounds, *refusal, at_m);
@@ -106,7 +101,7 @@ std::optional<Refused> refuse_command(const SafetyLimits& limits,
   if (command.kind == Command::Kind::take_off) {
     const double height = command.point_m.z();
     if (!(height > 0) || (bounds.max_height_m && height > *bounds.max_height_m)) {
-      return Refused{"take_off_height", text("take-off to %.1f m is outside the height band", height)};
+      return Refused{"take_off_height", sentence("take-off to %.1f m is outside the height band", height)};
     }
     return aircraft_m ? refuse_take_off(bounds, *aircraft_m, height) : std::nullopt;
   }
@@ -118,8 +113,8 @@ std::optional<Refused> refuse_command(const SafetyLimits& limits,
     return Refused{"position_unknown", "it is not known where the aircraft is"};
   const double jump_m = (command.point_m - *aircraft_m).norm();
   if (jump_m > limits.max_jump_m) {
-    return Refused{"jump",
-                   text("the target is %.0f m away, at most %.0f m are allowed", jump_m, limits.max_jump_m)};
+    return Refused{
+        "jump", sentence("the target is %.0f m away, at most %.0f m are allowed", jump_m, limits.max_jump_m)};
   }
   if (const auto refusal = planning::refuse_point(bounds, command.point_m)) {
     return Refused{std::string(planning::to_string(*refusal)),
@@ -141,7 +136,7 @@ std::optional<Alarm> watch(const SafetyLimits& limits, const Situation& now) {
   if (!now.flying) return std::nullopt;
   if (now.battery && *now.battery <= limits.critical_battery) {
     return Alarm{Reaction::land, false, "drone.battery",
-                 text("battery at %.0f %%: landing here", 100 * *now.battery)};
+                 sentence("battery at %.0f %%: landing here", 100 * *now.battery)};
   }
   if (now.battery_warning >= 2) {
     return Alarm{Reaction::land, false, "drone.battery",
@@ -149,52 +144,55 @@ std::optional<Alarm> watch(const SafetyLimits& limits, const Situation& now) {
   }
   if (now.cell_v && *now.cell_v <= limits.critical_cell_v) {
     return Alarm{Reaction::land, false, "drone.battery",
-                 text("battery at %.2f V a cell: landing here", *now.cell_v)};
+                 sentence("battery at %.2f V a cell: landing here", *now.cell_v)};
   }
   if (now.battery_warning == 1) {
     return Alarm{Reaction::return_home, false, "drone.battery", "the autopilot reports a low battery"};
   }
   if (now.cell_v && *now.cell_v <= limits.low_cell_v) {
     return Alarm{Reaction::return_home, false, "drone.battery",
-                 text("battery at %.2f V a cell, %.2f V are needed", *now.cell_v, limits.low_cell_v)};
+                 sentence("battery at %.2f V a cell, %.2f V are needed", *now.cell_v, limits.low_cell_v)};
   }
   if (now.battery && now.position_m && *now.battery <= return_margin(limits, *now.position_m)) {
     return Alarm{Reaction::return_home, false, "drone.battery",
-                 text("battery at %.0f %%, needed to return %.0f %%", 100 * *now.battery,
-                      100 * return_margin(limits, *now.position_m))};
+                 sentence("battery at %.0f %%, needed to return %.0f %%", 100 * *now.battery,
+                          100 * return_margin(limits, *now.position_m))};
   }
   if (now.position_m && now.position_age_s <= limits.position_age_s) {
     const auto floor_m = limits.bounds.min_height_m;
     if (now.floor && floor_m && now.position_m->z() < *floor_m - limits.floor_tolerance_m) {
-      return Alarm{Reaction::hold, true, "fence.breach",
-                   text("%.1f m high, the band begins at %.1f m: climbing", now.position_m->z(), *floor_m)};
+      return Alarm{
+          Reaction::hold, true, "fence.breach",
+          sentence("%.1f m high, the band begins at %.1f m: climbing", now.position_m->z(), *floor_m)};
     }
     if (auto alarm = breach(limits, *now.position_m)) return alarm;
   }
   if (now.autopilot_silent_s > limits.link_return_s) {
     return Alarm{Reaction::return_home, false, "drone.link",
-                 text("autopilot silent for %.0f s", now.autopilot_silent_s)};
+                 sentence("autopilot silent for %.0f s", now.autopilot_silent_s)};
   }
   if (now.autopilot_silent_s > limits.link_hold_s) {
     return Alarm{Reaction::hold, false, "drone.link",
-                 text("autopilot silent for %.0f s", now.autopilot_silent_s)};
+                 sentence("autopilot silent for %.0f s", now.autopilot_silent_s)};
   }
   if (!now.position_m || now.position_age_s > limits.position_age_s) {
     if (now.position_age_s > limits.rtk_return_s) {
       return Alarm{Reaction::return_home, false, "rtk.lost",
-                   text("no position for %.0f s", now.position_age_s)};
+                   sentence("no position for %.0f s", now.position_age_s)};
     }
-    return Alarm{Reaction::hold, false, "rtk.lost", text("no position for %.1f s", now.position_age_s)};
+    return Alarm{Reaction::hold, false, "rtk.lost", sentence("no position for %.1f s", now.position_age_s)};
   }
   if (now.wants_rtk && now.since_good_fix_s > limits.rtk_return_s) {
-    return Alarm{Reaction::return_home, false, "rtk.lost", text("no RTK for %.0f s", now.since_good_fix_s)};
+    return Alarm{Reaction::return_home, false, "rtk.lost",
+                 sentence("no RTK for %.0f s", now.since_good_fix_s)};
   }
   if (now.wants_rtk && now.since_good_fix_s > limits.rtk_hold_s) {
-    return Alarm{Reaction::hold, false, "rtk.lost", text("no RTK for %.1f s", now.since_good_fix_s)};
+    return Alarm{Reaction::hold, false, "rtk.lost", sentence("no RTK for %.1f s", now.since_good_fix_s)};
   }
   if (now.autopilot_m && (*now.autopilot_m - *now.position_m).norm() > limits.disagree_m) {
-    return Alarm{Reaction::hold, false, "position.disagree",
-                 text("autopilot and rover disagree by %.1f m", (*now.autopilot_m - *now.position_m).norm())};
+    return Alarm{
+        Reaction::hold, false, "position.disagree",
+        sentence("autopilot and rover disagree by %.1f m", (*now.autopilot_m - *now.position_m).norm())};
   }
   return std::nullopt;
 }

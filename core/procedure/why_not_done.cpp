@@ -1,22 +1,15 @@
 #include "core/procedure/why_not_done.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <cstdio>
 #include <numbers>
 #include <vector>
 
 #include "core/localize/accuracy_goal.hpp"
+#include "core/procedure/sentence.hpp"
 
 namespace anchord::procedure {
 namespace {
-
-std::string text(const char* format, double a, double b = 0) {
-  std::array<char, 200> out{};
-  std::snprintf(out.data(), out.size(), format, a, b);
-  return out.data();
-}
 
 /// Widest part of the horizon, in degrees, from which the anchor was not seen.
 double widest_gap_deg(std::span<const Eigen::Vector3d> points, const Eigen::Vector3d& from) {
@@ -35,36 +28,37 @@ std::string why_not_done(const std::optional<Estimate>& estimate, std::span<cons
                          const ExitRule& rule) {
   constexpr double k_flat_m = 2, k_one_side_deg = 230, k_nlos_share = 0.4, k_bias_m = 0.1;
   if (!estimate || !estimate->best) {
-    return text("too few ranges yet: %.0f used", estimate ? static_cast<double>(estimate->n_used) : 0.0);
+    return sentence("too few ranges yet: %.0f used", estimate ? static_cast<double>(estimate->n_used) : 0.0);
   }
   const auto& at = estimate->best->position.m;
   if (estimate->mirror) {
-    return text("mirror: a solution %.1f m away fits as well; another height or side decides",
-                (estimate->mirror->position.m - at).norm());
+    return sentence("mirror: a solution %.1f m away fits as well; another height or side decides",
+                    (estimate->mirror->position.m - at).norm());
   }
   if (!points.empty()) {
     const auto [low, high] = std::minmax_element(points.begin(), points.end(),
                                                  [](const auto& a, const auto& b) { return a.z() < b.z(); });
     if (high->z() - low->z() < k_flat_m) {
-      return text("flat flight: all points within %.1f m of height, its height is not seen",
-                  high->z() - low->z());
+      return sentence("flat flight: all points within %.1f m of height, its height is not seen",
+                      high->z() - low->z());
     }
     const double gap = widest_gap_deg(points, at);
     if (gap > k_one_side_deg)
-      return text("seen from one side only: %.0f degrees of the horizon are empty", gap);
+      return sentence("seen from one side only: %.0f degrees of the horizon are empty", gap);
   }
   std::size_t refused = 0;
   for (const auto& [reason, count] : estimate->refused) refused += count;
   const auto all = static_cast<double>(refused + estimate->n_used);
   if (all > 0 && static_cast<double>(refused) / all > k_nlos_share) {
-    return text("too many ranges refused: %.0f of %.0f", static_cast<double>(refused), all);
+    return sentence("too many ranges refused: %.0f of %.0f", static_cast<double>(refused), all);
   }
   if (estimate->bias_sigma_m && *estimate->bias_sigma_m > k_bias_m) {
-    return text("bias and position cannot be distinguished: bias known to %.2f m", *estimate->bias_sigma_m);
+    return sentence("bias and position cannot be distinguished: bias known to %.2f m",
+                    *estimate->bias_sigma_m);
   }
   const auto sigma = position_sigma_m(*estimate);
   if (sigma && rule.target_sigma_m && *sigma > *rule.target_sigma_m) {
-    return text("accuracy %.3f m, wanted %.3f m", *sigma, *rule.target_sigma_m);
+    return sentence("accuracy %.3f m, wanted %.3f m", *sigma, *rule.target_sigma_m);
   }
   if (estimate->verdict != Verdict::ok)
     return estimate->reason.empty() ? "not assessed as ok yet" : estimate->reason;
