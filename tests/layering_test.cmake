@@ -102,7 +102,7 @@ set(api_source "^(malloc\\.h$|nlohmann/json\\.hpp$|zlib\\.h$|openssl/|xxhash\\.h
 set(api/wire_header "${api_header}")
 set(api/wire_source "^(nlohmann/json\\.hpp$|simdjson\\.h$)")
 set(api/formats_header "${api_header}")
-set(api/formats_source "^(nlohmann/json\\.hpp$|zlib\\.h$|zip\\.h$|pugixml\\.hpp$)")
+set(api/formats_source "^(iconv\\.h$|nlohmann/json\\.hpp$|zlib\\.h$|zip\\.h$|pugixml\\.hpp$)")
 
 set(server/storage_header "^(${everywhere})")
 # Of JSON the one column that is GeoJSON.

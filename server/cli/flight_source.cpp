@@ -10,6 +10,7 @@
 
 #include "api/formats/foreign_flight.hpp"
 #include "core/base/text.hpp"
+#include "core/base/to_wire.hpp"
 #include "drivers/gnss/decoder.hpp"
 
 namespace anchord::cli {
@@ -188,7 +189,7 @@ Result<void> read_mapping(const std::string& file, ForeignOptions& out) {
     } else if (key == "column_for_each_anchor" && value.is_boolean()) {
       out.column_for_each_anchor = value.get<bool>();
     } else if (value.is_string() || value.is_number()) {
-      const auto read = read_setting(key, value.is_string() ? value.get<std::string>() : value.dump(), out);
+      const auto read = read_setting(key, value.is_string() ? value.get<std::string>() : to_wire(value), out);
       if (!read) return wrong(file + ": " + read.error().message);
     } else {
       return wrong(file + ": " + key + ": expected a text or a number" + (columns ? " of each field" : ""));

@@ -180,6 +180,8 @@ test('a flight out of a German spreadsheet, its anchors with names, gives the an
     sent = async (name) => {
       await id('import-name').fill(name);
       await id('import-send').click();
+      // Names of anchors are kept after the flight is finished; then the page goes on.
+      await page.waitForURL(/#\/anchors/, { timeout: 60_000 });
       await eventually(
         `${name} is in`,
         async () => (await get('/api/v1/missions')).items.some((m) => m.name === name && m.state === 'finished'),
