@@ -186,7 +186,9 @@ Result<bool> judge_file(const DataFolder& folder) {
 Result<std::unique_ptr<SqliteConnection>> sql::open_sqlite_file(const StorageOptions& options,
                                                                 DataFolder& folder, bool check) {
   const std::uint64_t bytes = size_of(folder.database());
-  if (bytes == 0 && (folder.had_database() || size_of(folder.wal()) > 0)) {
+  // A copy that was saved from under a running server says so where the whole folder was taken away.
+  const bool saved = size_of(folder.database().string() + ".saved-1") > 0;
+  if (bytes == 0 && (folder.had_database() || saved || size_of(folder.wal()) > 0)) {
     return damaged(folder,
                    std::filesystem::exists(folder.database()) ? "the file is empty" : "the file is missing");
   }

@@ -297,13 +297,13 @@ TEST_F(StorageFailure, AnswersUnavailableWhileAnotherProcessHoldsTheLockAndRecov
 
 /// SQLite goes on writing to a file that was taken away, without an error: rows would be acknowledged that
 /// nobody finds again.
-TEST_F(StorageFailure, AcknowledgesNothingOnceItsFileWasRemovedAndSavesWhatItHad) {
+TEST_F(StorageFailure, AcknowledgesNothingOnceItsFolderWasRemovedAndSavesWhatItHad) {
   MissionId mission;
   {
     const auto db = open();
     mission = mission_in(*db).id;
     ASSERT_TRUE(db->stores().measurements.append_ranges(batch(mission, 0, 50), false));
-    for (const char* part : {"", "-wal", "-shm"}) std::filesystem::remove(file().string() + part);
+    std::filesystem::remove_all(options_.data_dir);
     const auto refused = db->stores().measurements.append_ranges(batch(mission, 50, 50), false);
     ASSERT_FALSE(refused);
     EXPECT_EQ(refused.error().code, Errc::storage_unavailable);
