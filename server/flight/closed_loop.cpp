@@ -92,7 +92,7 @@ Result<Plan> plan_from_outline(const sim::World& world) {
     plan.outline.push_back({at.lon_deg, at.lat_deg});
   }
   plan.settings.max_height_m = world.height_m + 6;
-  // Hovering sees one geometry again and again, walls included; the way between the points sees many.
+  // A longer stay at each point is hardly worth its time: 4 s bring a millimetre (docs/flying.md).
   plan.settings.dwell_s = 0.5;
   plan.settings.samples = 2;
   plan.settings.max_flight_s = 1500;
