@@ -198,7 +198,7 @@ Result<void> WorkDesk::State::look_after_waiting(const std::vector<WorkStatus>& 
   raise(others ? "jobs wait, and the workers that are there run another version than this server's " +
                      deps.options.version + ": install the same one"
                : "jobs wait and no worker was seen for a minute: start anchord worker --database, or set "
-                 "jobs.run_here to true");
+                 "jobs.run_here to on");
   return boost::outcome_v2::success();
 }
 

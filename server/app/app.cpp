@@ -380,7 +380,7 @@ void App::State::compose() {
   deps.mqtt_prefix = config.text("mqtt.prefix");
   deps.run_plan_work = deps.run_work = work_in_process();
   deps.work_store = database->work();
-  deps.run_jobs_here = config.flag("jobs.run_here");
+  deps.run_jobs_here = config.text("jobs.run_here") == "on";
   deps.job_lease = config.seconds("jobs.lease_s");
   deps.worker_name = "server " + worker_name();
   deps.model_key_is_new = model_key.fresh;

@@ -56,15 +56,14 @@ constexpr std::array k_options = {
     Option{"backup.every_h", "24", "hours between two scheduled backups", count},
     Option{"backup.keep", "7", "backups found whole that are kept, never fewer than 7; older ones go", count},
     Option{"backup.dir", "", "where backups are put, another disk if there is one [DATA_DIR/backups]"},
-    Option{"jobs.run_here", "true",
-           "with PostgreSQL: training runs that no worker takes run on the server; false: only on workers "
+    Option{"jobs.run_here", "on",
+           "with PostgreSQL: training runs that no worker takes run on the server; off: only on workers "
            "(anchord worker)",
-           flag},
-    Option{
-        "jobs.lease_s", "15",
-        "with PostgreSQL: a job that runs on the server and gives no sign for so many seconds is taken "
-        "over by a worker",
-        seconds},
+           choice, "on|off"},
+    Option{"jobs.lease_s", "15",
+           "with PostgreSQL: a job that runs on the server and gives no sign for so many seconds is taken "
+           "over by a worker",
+           seconds},
     Option{"missions.keep_deleted_days", "30", "days of running time that a deleted mission can be restored",
            count},
     Option{"drone.address", "",

@@ -132,7 +132,7 @@ test('a worker makes the bytes that the server makes, and the server signs them'
   const here = await begin(quick);
   assert.match((await succeeds(here)).worker, /^server /);
   await server.stop();
-  server.env.ANCHORD_JOBS_RUN_HERE = 'false';
+  server.env.ANCHORD_JOBS_RUN_HERE = 'off';
   await server.start();
   const there = await begin(quick);
   // As if a server of another version had handed it out: this one does it again, or nobody would ever claim it.
