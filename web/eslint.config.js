@@ -8,6 +8,10 @@ import typescript from 'typescript-eslint';
 
 const unused = { args: 'after-used', argsIgnorePattern: '^_', varsIgnorePattern: '^_', caughtErrors: 'none' };
 
+const message = 'use get, list, call, bytes or url of src/api/contract.ts: they are typed by api/openapi.yaml',
+  DOORS = ['fetch', 'XMLHttpRequest', 'EventSource', 'WebSocket'].map((name) => ({ name, message })),
+  HOLDERS = ['window', 'globalThis', 'self'];
+
 export default typescript.config(
   // The client of the contract has its types from a file that its test generates, and the compiler there.
   { ignores: ['**/node_modules/', '**/generated/', '**/dist/', 'build/', '**/e2e/clients/'] },
@@ -48,6 +52,18 @@ export default typescript.config(
       // The hooks of Preact have React's names and React's rules.
       'react-hooks/rules-of-hooks': 'error',
       'react-hooks/exhaustive-deps': 'error',
+    },
+  },
+  {
+    // Whatever is asked of the server is held against its contract: there is no other way to it than src/api/contract.ts, and src/live for the stream.
+    files: ['**/src/**/*.ts', '**/src/**/*.tsx'],
+    ignores: ['**/src/api/contract.ts', '**/src/live/browser.ts'],
+    rules: {
+      'no-restricted-globals': ['error', ...DOORS],
+      'no-restricted-properties': [
+        'error',
+        ...DOORS.flatMap((d) => HOLDERS.map((object) => ({ object, property: d.name, message: d.message }))),
+      ],
     },
   },
 );

@@ -235,7 +235,7 @@ std::set<std::string> words_without_a_table() {
           "PositionDiff.items.change", "DatasetCreate.split.by", "DatasetRules.positive", "DatasetRow.split",
           "TrainingRunCreate.select.metric", "TrainingConfusion.positive", "TrainingPrediction.split",
           "GET /api/v1/training-runs/{id}/predictions ?split", "Me.auth", "System.clock.source",
-          "System.mqtt.state", "FloorPlanGeoreference.source"};
+          "System.mqtt.state", "FloorPlanGeoreference.source", "LiveEstimate.status"};
 }
 
 std::map<std::string, Json> tables_of_receivers() {
@@ -328,6 +328,15 @@ TEST(WireWords, AreThoseOfOpenApi) {
 
 TEST(WireWords, AreThoseOfAsyncApi) {
   const std::map<std::string, Json> tables{
+      {"topic.alarms.priority", words(k_alarm_priority_words)},
+      {"topic.anchors_estimates.verdict", words(k_verdict_words)},
+      {"topic.drone_pose.fix", words(k_fix_words)},
+      {"topic.fixes.fix", words(k_fix_words)},
+      {"topic.rtk_status.fix", words(k_fix_words)},
+      {"topic.events.level", words(k_event_level_words)},
+      {"topic.jobs.state", words(k_job_state_words)},
+      {"topic.mission_state.state", words(k_mission_state_words)},
+      {"topic.mission_state.frame", words(k_frame_words)},
       {"topic.mission_grid.rule", words(planning::k_rule_words)},
       {"topic.mission_grid.combine", words(planning::k_combine_words)},
       {"topic.procedure.mode", words(flight::k_flight_mode_words)},
@@ -337,7 +346,10 @@ TEST(WireWords, AreThoseOfAsyncApi) {
       {"topic.procedure.commands.state", words(k_command_state_words)},
       {"sub.topic", topic_names()},
   };
-  expect_the_same(enums_of_asyncapi(), tables, {});
+  // Texts that are chosen where they are written.
+  const std::set<std::string> without{"topic.anchors_estimates.status", "topic.devices.state",
+                                      "topic.procedure.drone.others.kind"};
+  expect_the_same(enums_of_asyncapi(), tables, without);
 }
 
 }  // namespace

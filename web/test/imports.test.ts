@@ -7,7 +7,7 @@ const refusal = (body: object) => Promise.reject(new ApiError(problem_of(body, 4
 
 describe('the report on rows', () => {
   const report = { accepted: 0, duplicates: 0, rejected: 2, errors: [{ line: 1, code: 'zero_distance' }] };
-  it('is the answer', async () => expect(await row_report(Promise.resolve(report))).toEqual(report));
+  it('is the answer', async () => expect(await row_report(Promise.resolve({ body: report }))).toEqual(report));
   it('is in the problem where not one row was taken', async () => {
     const body = { type: '/problems/validation', title: 'x', status: 422, ...report };
     expect(await row_report(refusal(body))).toEqual(body);

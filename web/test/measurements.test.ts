@@ -1,5 +1,13 @@
 import { describe, expect, it, vi } from 'vitest';
-import { download_url, EVERYTHING, query_of, type Filter, type Sample, type Source } from '../src/api/measurements';
+import {
+  download_url,
+  EVERYTHING,
+  ranges_query,
+  samples_query,
+  type Filter,
+  type Sample,
+  type Source,
+} from '../src/api/measurements';
 import {
   every_of,
   histogram,
@@ -27,8 +35,8 @@ const sample = (id: number, over: Partial<Sample> = {}): Sample => ({
 
 const flight: Source = { kind: 'mission', id: 'm1', name: 'flight' },
   rooms: Source = { kind: 'campaign', id: 'c/1', name: 'rooms' };
-const query = (s: Source, over: Partial<Filter>): Record<string, string> =>
-  Object.fromEntries(query_of(s, { ...EVERYTHING, ...over }));
+const query = (s: Source, over: Partial<Filter>): object =>
+  s.kind === 'mission' ? ranges_query(s.id, { ...EVERYTHING, ...over }) : samples_query({ ...EVERYTHING, ...over });
 describe('the filter of measurements', () => {
   it('asks for the whole flight when nothing is asked', () => expect(query(flight, {})).toEqual({ mission: 'm1' }));
   it('is the query of the server, zero and negative limits included', () =>
@@ -51,10 +59,10 @@ describe('the filter of measurements', () => {
       label: 'none',
       class: 'unclear',
       fix: 'float',
-      min_distance_m: '0',
-      max_distance_m: '12.5',
-      min_level_dbm: '-95',
-      max_level_dbm: '-70',
+      min_distance_m: 0,
+      max_distance_m: 12.5,
+      min_level_dbm: -95,
+      max_level_dbm: -70,
       since: '1',
       until: '2',
     }));

@@ -17,7 +17,7 @@ const mission: MissionMsg = {
   range_rate_hz: null,
   fixes_refused: {},
 };
-const fix = (t_s: number, e: number) => ({ t_us: t_s * 1e6, local_m: [e, 0, 5], fix: 'fixed' });
+const fix = (t_s: number, e: number) => ({ t_us: t_s * 1e6, local_m: [e, 0, 5], fix: 'fixed' as const });
 const range = (t_s: number): RangeMsg => ({
   t_us: t_s * 1e6,
   mission: 'm',
@@ -119,7 +119,7 @@ describe('a fix of the recording', () => {
 });
 
 describe('events of a recording', () => {
-  const at = (t_s: number) => ({ t_us: t_s * 1e6, level: 'info', text: `at ${t_s}` }),
+  const at = (t_s: number) => ({ t_us: t_s * 1e6, level: 'info' as const, text: `at ${t_s}` }),
     marks = marks_of([at(300), at(200), null, at(200), at(100), at(9000)], 0, 599e6);
   it('are in the order of the flight, whatever the order of the answer', () =>
     expect(marks.map((m) => m.t_us / 1e6)).toEqual([100, 200, 200, 300]));
@@ -143,7 +143,7 @@ describe('a stored range', () => {
     expect(r.corrected_m).toBeCloseTo(5);
   });
   it('is as measured where no model is promoted', () => {
-    for (const predicted of [undefined, null, { class: 'unclear', p_los: null, bias_m: null }]) {
+    for (const predicted of [undefined, null, { class: 'unclear' as const, p_los: null, bias_m: null }]) {
       const r = range_of('m')({ ...row, predicted })!;
       expect([r.p_los, r.corrected_m]).toEqual([null, 5.3]);
     }

@@ -63,7 +63,7 @@ describe('the trail after a reload', () => {
         [3.71310143, 51.0231, 10],
       ],
     },
-    properties: { t_us: [1e6, 2e6], fix: ['fixed', 'float'], local_m: null },
+    properties: { t_us: [1e6, 2e6], fix: ['fixed' as const, 'float' as const], local_m: null },
   };
   it('is in metres about the origin of the flight', () => {
     const [first, second] = trail_of(feature, { lon: 3.7131, lat: 51.0231, h_m: 10 });

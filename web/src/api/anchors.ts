@@ -1,26 +1,29 @@
 /// Anchors as the Anchors view shows them, whether they come from the stream, from a published revision or from a fresh calibration.
 import {
   cov6,
+  elements,
   ellipse,
   estimate,
   gates as gates_of,
-  mirror,
   num,
   obj,
+  objects,
   str,
   STATUS,
   vec3,
+  word,
   VERDICT,
   type AnchorStatus,
   type EstimateMsg,
   type GateMsg,
   type Mirror,
+  type Said,
 } from '../live/messages';
+import type { Topic } from '../live/stream';
 import { ellipse_from_covariance, enu_from_geodetic } from '../map/enu';
 import { gate_value } from '../ui/gates';
-import { api_url, request } from './client';
 import { newest_summary } from './calibrations';
-import { call, list, type Wire } from './contract';
+import { call, get, given, list, url, type Wire } from './contract';
 
 export type Gate = GateMsg;
 /// What the uncertainty of a position comes from: sources and their shares of the covariance, largest first.
@@ -71,7 +74,7 @@ export const row_of_estimate = (e: EstimateMsg): AnchorRow => ({
   height_msl_m: null,
 });
 
-function budget_of(v: unknown): Budget | null {
+function budget_of(v: Said<Wire<'ErrorBudget'>>): Budget | null {
   const o = obj(v),
     sources = obj(o?.sources);
   if (!o || !sources) return null;
@@ -81,7 +84,7 @@ function budget_of(v: unknown): Budget | null {
     .sort((a, b) => b.share - a.share);
   return { shares, help: str(o.help_text) };
 }
-function goal_of(v: unknown): AnchorGoal | null {
+function goal_of(v: Said<Wire<'AnchorGoal'>>): AnchorGoal | null {
   const o = obj(v);
   return o && { words: str(o.words), reached: o.reached === true, limits: gates_of(o.limits) };
 }
@@ -93,20 +96,16 @@ export const over_goal_words = (r: AnchorRow): string =>
         .filter((g) => !g.passed)
         .map(gate_value)
         .join(', ')}`;
-const point = (v: unknown): { lon: number | null; lat: number | null; h_m: number | null } => {
-  const c = vec3(obj(v)?.coordinates ?? v);
+type Lonlat = Readonly<Record<'lon' | 'lat' | 'h_m', number | null>>;
+const place_at = (coordinates: Said<readonly number[]>): Lonlat => {
+  const c = vec3(coordinates);
   return { lon: c?.[0] ?? null, lat: c?.[1] ?? null, h_m: c?.[2] ?? null };
 };
-function mirror_of(v: unknown): Mirror | null {
+function mirror_of(v: Said<Wire<'Mirror'>>): Mirror | null {
   const o = obj(v);
-  return (
-    o &&
-    (o.coordinates === undefined && o.geometry === undefined
-      ? mirror(o)
-      : { ...point(o.geometry ?? o.coordinates), enu_m: vec3(o.enu_m), probability: num(o.probability) })
-  );
+  return o && { ...place_at(o.coordinates), enu_m: vec3(o.enu_m), probability: num(o.probability) };
 }
-function crs_words(v: unknown): string {
+function crs_words(v: Said<Wire<'Crs'>>): string {
   const o = obj(v),
     base = obj(o?.base);
   if (!o) return '';
@@ -133,26 +132,26 @@ function status_of(status: string, verdict: string, acceptable: unknown, goal: A
 }
 
 /// `properties` of a GeoJSON feature or one anchor of a calibration; `geometry` beside it.
-export function row_of(p: Record<string, unknown>, geometry: unknown): AnchorRow | null {
-  const network_id = str(p.network_id);
-  if (!network_id) return null;
+type Described = Partial<Wire<'Anchor'>['properties']> & Partial<Omit<Wire<'AnchorResult'>, 'geometry'>>;
+export function row_of(v: Said<Described>, geometry: Said<Wire<'Point'>>): AnchorRow | null {
+  const p = obj(v),
+    network_id = str(p?.network_id);
+  if (!p || !network_id) return null;
   const accuracy = obj(p.accuracy),
-    relative = obj(accuracy?.relative) ?? accuracy,
+    relative = obj(accuracy?.relative),
     absolute = obj(accuracy?.absolute),
     quality = obj(p.quality);
   const cov = cov6(relative?.cov_enu_m2),
     provenance = obj(p.provenance);
   const verdict = str(quality?.verdict) || str(p.verdict);
-  const known = (VERDICT as readonly string[]).includes(verdict);
   const status = str(p.status);
   const contradiction = str(obj(p.contradiction)?.text);
   const base = estimate({
     anchor: network_id,
-    mission: Array.isArray(provenance?.missions) ? str(provenance.missions[0]) : '',
-    verdict: known ? verdict : 'ok',
-    status: (STATUS as readonly string[]).includes(status) ? status : 'found',
+    mission: str(elements(provenance?.missions)[0]),
+    verdict: word(verdict, VERDICT, 'ok'),
     reason: contradiction || str(quality?.reason) || str(p.reason),
-    ...point(geometry),
+    ...place_at(obj(geometry)?.coordinates),
     enu_m: p.enu_m ?? p.local_m,
     cov_enu_m2: relative?.cov_enu_m2,
     h95_m: relative?.h95_m,
@@ -162,20 +161,19 @@ export function row_of(p: Record<string, unknown>, geometry: unknown): AnchorRow
     n_ranges: quality?.n_ranges,
     n_refused: quality?.n_refused,
     rms_residual_m: quality?.rms_residual_m,
-    probability: p.probability,
-  });
+  } satisfies Said<Topic<'anchors.estimates'>>);
   if (!base) return null;
   const other_side = mirror_of(p.mirror),
     goal = goal_of(p.goal);
   return {
     ...base,
-    status: status_of(status, verdict, quality?.acceptable, goal) ?? base.status,
+    status: status_of(status, verdict, quality?.acceptable, goal) ?? word(status, STATUS, 'found'),
     goal,
     ellipse95: ellipse(relative?.ellipse95) ?? (cov && ellipse_from_covariance(cov)),
     mirror: other_side,
     contradiction,
     budget: budget_of(p.budget),
-    probability: base.probability ?? (other_side?.probability == null ? null : 1 - other_side.probability),
+    probability: other_side?.probability == null ? null : 1 - other_side.probability,
     name: str(p.name),
     absolute_h95_m: num(absolute?.h95_m),
     absolute_v95_m: num(absolute?.v95_m),
@@ -191,27 +189,30 @@ export function row_of(p: Record<string, unknown>, geometry: unknown): AnchorRow
     height_msl_m: num(p.height_orthometric_m),
   };
 }
-export function rows_of_collection(answer: unknown): { rows: AnchorRow[]; revision: number | null } {
-  const o = obj(answer);
-  const features = Array.isArray(o?.features) ? o.features : [];
-  const rows = features
-    .map((f) => {
-      const x = obj(f);
-      return x ? row_of(obj(x.properties) ?? {}, x.geometry) : null;
-    })
-    .filter((r): r is AnchorRow => r !== null);
+export interface Collected {
+  readonly rows: AnchorRow[];
+  readonly revision: number | null;
+}
+export function rows_of_collection(answer: Said<Wire<'AnchorCollection'>>): Collected {
+  const rows = objects(obj(answer)?.features).flatMap((f) => {
+    const row = row_of(f.properties, f.geometry);
+    return row ? [row] : [];
+  });
   return {
     rows,
     revision:
-      num(o?.revision) ??
+      num(obj(answer)?.revision) ??
       rows.reduce<number | null>((r, x) => (x.revision === null ? r : Math.max(r ?? 0, x.revision)), null),
   };
 }
 /// What the flight itself estimates of its anchors.
 export const live_rows = async (mission: string): Promise<readonly AnchorRow[]> =>
-  rows_of_collection(await request('GET', `/anchors?view=live&mission=${encodeURIComponent(mission)}&limit=1000`)).rows;
-export const published = async (): Promise<{ rows: AnchorRow[]; revision: number | null }> =>
-  rows_of_collection(await request('GET', '/anchors?limit=1000'));
+  rows_of_collection(await get('/anchors', { query: { view: 'live', mission, limit: 1000 } })).rows;
+export const published = async (): Promise<Collected> =>
+  rows_of_collection(await get('/anchors', { query: { limit: 1000 } }));
+/// Where the table of them is as a file: what a flight estimates, else what is published.
+export const anchors_url = (format: 'csv' | 'geojson', live: boolean, mission: string | null): string =>
+  url('/anchors', { query: given({ format, view: live ? 'live' : null, mission: live ? mission : null }) });
 
 export interface Calibration {
   readonly id: string;
@@ -221,22 +222,20 @@ export interface Calibration {
   readonly lever_arm_sigma_m: number | null; ///< how well the arm of its first flight is known, as the accuracies hold it
   readonly rows: readonly AnchorRow[];
 }
-export function calibration_of(answer: unknown): Calibration | null {
+/// Null: still a job, for whoever waited for it.
+export function calibration_of(answer: Said<Wire<'Calibration'>>): Calibration | null {
   const o = obj(answer);
-  if (!o || !str(o.id) || !Array.isArray(o.anchors)) return null;
+  if (!o || !str(o.id) || !o.anchors) return null;
   return {
     id: str(o.id),
     created_at: str(o.created_at),
-    published: Array.isArray(o.published) && o.published.length > 0,
+    published: elements(o.published).length > 0,
     after_landing: obj(o.settings)?.after_landing === true,
-    lever_arm_sigma_m: num(obj((obj(o.provenance)?.flights as unknown[] | undefined)?.[0])?.lever_arm_sigma_m),
-    rows: o.anchors
-      .map((a): AnchorRow | null => {
-        const x = obj(a);
-        const row = x && row_of(x, x.geometry);
-        return row && { ...row, calibration: str(o.id) };
-      })
-      .filter((r): r is AnchorRow => r !== null),
+    lever_arm_sigma_m: num(obj(elements(obj(o.provenance)?.flights)[0])?.lever_arm_sigma_m),
+    rows: objects(o.anchors).flatMap((a) => {
+      const row = row_of(a, a.geometry);
+      return row ? [{ ...row, calibration: str(o.id) }] : [];
+    }),
   };
 }
 /// `lever_arm_sigma_m`: how well the arm was measured; null: as the flight declares.
@@ -245,19 +244,17 @@ export async function calibrate(
   key: string,
   lever_arm_sigma_m: number | null = null,
 ): Promise<Calibration> {
-  const answer = await request(
-    'POST',
-    '/calibrations',
-    { missions: [mission], ...(lever_arm_sigma_m !== null && { lever_arm_sigma_m }) },
-    { Prefer: 'wait=120', 'Idempotency-Key': key },
-  );
-  const done = calibration_of(answer);
+  const { body } = await call('post', '/calibrations', {
+      body: given<Wire<'CalibrationCreate'>>({ missions: [mission], lever_arm_sigma_m }),
+      headers: { Prefer: 'wait=120', 'Idempotency-Key': key },
+    }),
+    done = calibration_of(body);
   if (!done) throw new Error('The calibration is still running; look again in a minute.');
   return done;
 }
 export async function newest_calibration(mission: string): Promise<Calibration | null> {
   const of_it = await newest_summary(mission);
-  return of_it ? calibration_of(await request('GET', `/calibrations/${encodeURIComponent(of_it.id)}`)) : null;
+  return of_it ? calibration_of(await get('/calibrations/{id}', { path: { id: of_it.id } })) : null;
 }
 /// An anchor that fails a gate goes out only with the reason a person gives for it.
 export type Override = NonNullable<Wire<'Publish'>['overrides']>[number];
@@ -274,11 +271,11 @@ export async function publish(
   key: string,
   only: readonly string[] | null = null,
 ): Promise<number | null> {
-  const body = {
-    ...(note ? { note } : {}),
-    ...(only ? { anchors: [...only] } : {}),
-    ...(overrides.length ? { overrides: [...overrides] } : {}),
-  };
+  const body = given<Wire<'Publish'>>({
+    note,
+    anchors: only && [...only],
+    overrides: overrides.length ? [...overrides] : null,
+  });
   const answer = await call('post', '/calibrations/{id}/publish', {
     path: { id: calibration },
     body,
@@ -292,7 +289,7 @@ export type Moved = Wire<'PositionDiff'>['items'][number];
 export const moved_since_published = async (calibration: string): Promise<Map<string, Moved>> =>
   new Map((await list('/calibrations/{id}/diff', { path: { id: calibration } })).map((o) => [o.network_id, o]));
 export const report_url = (calibration: string): string =>
-  api_url(`/calibrations/${encodeURIComponent(calibration)}/report`);
+  url('/calibrations/{id}/report', { path: { id: calibration } });
 
 /// One published position of an anchor, and how far it is from the one before; null where either has no place on the globe.
 export interface Past {
@@ -304,18 +301,18 @@ export interface Past {
   readonly horizontal_m: number | null;
   readonly vertical_m: number | null;
 }
-export function past_of(answer: unknown): Past[] {
-  const items = obj(answer)?.items,
-    list = (Array.isArray(items) ? items : []).map(obj).filter((o) => o !== null) as Record<string, unknown>[];
-  return list.map((o, i) => {
-    const here = point(o.geometry),
-      before = list[i + 1] ? point(list[i + 1]!.geometry) : null,
+export function past_of(answer: Said<readonly Wire<'Published'>[]>): Past[] {
+  const all = objects(answer);
+  return all.map((o, i) => {
+    const here = place_at(obj(o.geometry)?.coordinates),
+      earlier = all[i + 1],
+      before = earlier ? place_at(obj(earlier.geometry)?.coordinates) : null,
       relative = obj(obj(o.accuracy)?.relative);
     const known = here.lon !== null && here.lat !== null && before?.lon != null && before.lat !== null;
     const shift = known
       ? enu_from_geodetic(
-          { lon: here.lon!, lat: here.lat!, h_m: here.h_m ?? 0 },
-          { lon: before.lon!, lat: before.lat!, h_m: before.h_m ?? 0 },
+          { lon: here.lon, lat: here.lat, h_m: here.h_m ?? 0 },
+          { lon: before.lon, lat: before.lat, h_m: before.h_m ?? 0 },
         )
       : null;
     return {
@@ -330,4 +327,4 @@ export function past_of(answer: unknown): Past[] {
   });
 }
 export const past = async (anchor: string): Promise<Past[]> =>
-  past_of(await request('GET', `/anchors/${encodeURIComponent(anchor)}/history`));
+  past_of(await list('/anchors/{id}/history', { path: { id: anchor } }));

@@ -1,6 +1,6 @@
 /// Labelling in the field: the ranges of one anchor as they are stored, and their import into a campaign.
-import { request } from './client';
-import { call, get, list, type Wire } from './contract';
+import { call, get, given, list, type Wire } from './contract';
+import type { operations } from './generated/schema';
 
 type Row = Wire<'Range'>;
 /// Measured time of the newest stored range; 0 where there is none.
@@ -15,7 +15,7 @@ export const ranges_after = (
   with_cir: boolean,
 ): Promise<Row[]> =>
   list('/ranges', {
-    query: { mission, anchor, since: String(after_us + 1), sort: 't_us', limit, ...(with_cir ? { cir: true } : {}) },
+    query: given({ mission, anchor, since: String(after_us + 1), sort: 't_us', limit, cir: with_cir || null }),
   });
 
 export type Setting = NonNullable<Wire<'Campaign'>['settings']>[number];
@@ -25,14 +25,19 @@ export const make_campaign = (name: string, key: string): Promise<unknown> =>
   call('post', '/campaigns', { body: { name }, headers: { 'Idempotency-Key': key } });
 
 export type Imported = Wire<'CampaignImport'>;
-/// Lines are not the JSON that the typed calls send.
+/// What is true of every row that an import brings, beside the rows.
+export type TruthOfRows = NonNullable<operations['importCampaignSamples']['parameters']['query']>;
 export const import_lines = async (
   campaign: string,
-  truth: URLSearchParams,
+  truth: TruthOfRows,
   lines: string,
   key: string,
 ): Promise<Imported> =>
-  (await request('POST', `/campaigns/${encodeURIComponent(campaign)}/samples?${truth}`, lines, {
-    'Content-Type': 'application/x-ndjson',
-    'Idempotency-Key': key,
-  })) as Imported;
+  (
+    await call('post', '/campaigns/{id}/samples', {
+      path: { id: campaign },
+      query: truth,
+      file: { type: 'application/x-ndjson', data: lines },
+      headers: { 'Idempotency-Key': key },
+    })
+  ).body;

@@ -1,4 +1,4 @@
-/// REST of this page's own server. Every failure is an ApiError that carries a problem (RFC 9457), so a view can show title, detail and request id.
+/// Failures of REST: each is an ApiError that carries a problem (RFC 9457), so a view can show title, detail and request id.
 import { num, obj, str } from '../live/messages';
 
 export interface FieldProblem {
@@ -45,54 +45,6 @@ export function problem_of(body: unknown, status: number): Problem {
   };
 }
 
-export const api_url = (path: string): string => new URL(`api/v1${path}`, document.baseURI.split('#')[0]).toString();
-
-/// `etag` names the state that was read; sent back as If-Match, a change of another state is refused.
-export interface Answer {
-  readonly body: unknown;
-  readonly etag: string;
-}
-export const request = async (
-  method: string,
-  path: string,
-  body?: unknown,
-  headers: Record<string, string> = {},
-): Promise<unknown> => (await exchange(method, path, body, headers)).body;
-export async function exchange(
-  method: string,
-  path: string,
-  body?: unknown,
-  headers: Record<string, string> = {},
-): Promise<Answer> {
-  let answer: Response;
-  try {
-    answer = await fetch(api_url(path), {
-      method,
-      credentials: 'same-origin',
-      cache: 'no-cache',
-      headers: {
-        Accept: 'application/json, application/geo+json, application/problem+json',
-        'X-Anchord': '1',
-        ...(body === undefined ? {} : { 'Content-Type': 'application/json' }),
-        ...headers,
-      },
-      ...(body === undefined
-        ? {}
-        : { body: typeof body === 'string' || body instanceof Blob ? body : JSON.stringify(body) }),
-    });
-  } catch {
-    throw new ApiError(problem_of(null, 0));
-  }
-  const text = await answer.text();
-  let parsed: unknown = null;
-  try {
-    parsed = text ? JSON.parse(text) : null;
-  } catch {
-    /* not JSON: the status alone speaks */
-  }
-  if (!answer.ok) throw new ApiError(problem_of(parsed, answer.status), parsed);
-  return { body: parsed, etag: answer.headers.get('etag') ?? '' };
-}
 /// What is wrong with each field, where the problem's own words do not say it already; the first five.
 function field_texts({ errors, detail }: Problem): string {
   const more = errors

@@ -1,7 +1,7 @@
 /// Devices that this server drives, radios it heard, and the radio settings of tags.
-import { idempotency_key, request } from './client';
-import { call, get, list, type Wire } from './contract';
-import type { paths } from './generated/schema';
+import { idempotency_key } from './client';
+import { call, get, given, list, type Wire } from './contract';
+import type { operations, paths } from './generated/schema';
 
 type Configured = Wire<'ConfiguredDevice'>;
 /// A device of the contract, or a radio that was only received: then without an id, an address and a state. Text that is absent is empty.
@@ -63,19 +63,27 @@ const at = (id: string): { readonly path: { readonly id: string } } => ({ path: 
 const PATCH = 'application/merge-patch+json';
 export const add_device = ({ kind, name, address, options }: DeviceForm): Promise<unknown> =>
   call('post', '/devices', {
-    body: { kind, address, ...(name ? { name } : {}), ...(Object.keys(options ?? {}).length ? { options } : {}) },
+    body: given<Wire<'DeviceWrite'>>({
+      kind,
+      address,
+      name,
+      options: Object.keys(options ?? {}).length ? options : null,
+    }),
     headers: { 'Idempotency-Key': idempotency_key() },
   });
-export const act_on_device = (id: string, action: string, args?: object): Promise<unknown> =>
-  request(
-    'POST',
-    `/devices/${id}/actions`,
-    { action, ...(args ? { arguments: args } : {}) },
-    { 'Idempotency-Key': idempotency_key() },
-  );
+type Asked = operations['actOnDevice']['requestBody']['content']['application/json'];
+/// What the device answers, which is its own to say.
+export const act_on_device = async (id: string, action: string, args?: Record<string, unknown>): Promise<unknown> =>
+  (
+    await call('post', '/devices/{id}/actions', {
+      ...at(id),
+      body: given<Asked>({ action, arguments: args }),
+      headers: { 'Idempotency-Key': idempotency_key() },
+    })
+  ).body.result;
+type Patch = Partial<Wire<'DeviceWrite'>>;
 /// The newest state is what the button showed; a device is changed by one person at a time.
-export const change_device = (id: string, change: Partial<Wire<'DeviceWrite'>>): Promise<unknown> =>
-  request('PATCH', `/devices/${id}`, change, { 'If-Match': '*', 'Content-Type': PATCH });
+export const change_device = (id: string, change: Patch): Promise<unknown> => edit_device(id, '*', change);
 type UwbWanted = NonNullable<
   paths['/api/v1/devices/{id}/uwb-settings']['put']['requestBody']
 >['content']['application/json'];
@@ -101,7 +109,7 @@ export async function device_at(id: string): Promise<{ readonly device: Device; 
   const { body, etag } = await call('get', '/devices/{id}', at(id));
   return { device: device_of(body), etag };
 }
-export const edit_device = (id: string, etag: string, patch: object): Promise<unknown> =>
-  request('PATCH', `/devices/${id}`, patch, { 'If-Match': etag, 'Content-Type': PATCH });
+export const edit_device = (id: string, etag: string, body: Patch): Promise<unknown> =>
+  call('patch', '/devices/{id}', { ...at(id), body, headers: { 'If-Match': etag, 'Content-Type': PATCH } });
 export const forget_device = (id: string): Promise<unknown> =>
   call('delete', '/devices/{id}', { ...at(id), headers: { 'If-Match': '*' } });

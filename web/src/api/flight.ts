@@ -1,6 +1,6 @@
 /// Commanding a flight: who has control, what must be green before take-off, and the commands. Everything here is answered by the server's guard.
 import { idempotency_key } from './client';
-import { call, get, type Wire } from './contract';
+import { call, get, given, type Wire } from './contract';
 
 export type Action = NonNullable<Wire<'MissionAction'>['action']>;
 export interface Lease {
@@ -16,7 +16,7 @@ async function control(mission: string, body: Wire<'ControlAction'>): Promise<Le
   return { key: held.lease ?? '', since_us: held.since_us ?? 0, expires_us: held.expires_us ?? 0 };
 }
 export const take_control = (mission: string, force: boolean): Promise<Lease> =>
-  control(mission, { action: 'take', ...(force ? { force } : {}) });
+  control(mission, given<Wire<'ControlAction'>>({ action: 'take', force: force || null }));
 export const renew_control = (mission: string, lease: string): Promise<Lease> =>
   control(mission, { action: 'renew', lease });
 export const release_control = (mission: string, lease: string): Promise<unknown> =>

@@ -1,6 +1,6 @@
 /// Buildings, floors and their plans.
-import { exchange, idempotency_key } from './client';
-import { call, get, list, type Wire } from './contract';
+import { idempotency_key } from './client';
+import { call, get, list, url, type Wire } from './contract';
 
 export type Floor = Wire<'Floor'>;
 export type Georeference = Wire<'FloorPlanGeoreference'>;
@@ -34,12 +34,14 @@ export async function floor(id: string): Promise<Held> {
   return { floor: body, etag };
 }
 export async function send_plan(held: Held, file: Blob): Promise<Held> {
-  const { body, etag } = await exchange('PUT', `/floors/${held.floor.id}/plan`, file, {
-    'If-Match': held.etag,
-    'Content-Type': 'application/octet-stream',
+  const { body, etag } = await call('put', '/floors/{id}/plan', {
+    path: { id: held.floor.id },
+    file: { type: 'application/octet-stream', data: file },
+    headers: { 'If-Match': held.etag },
   });
-  return { floor: body as Floor, etag };
+  return { floor: body, etag };
 }
+export const preview_url = (floor: string): string => url('/floors/{id}/plan/preview', { path: { id: floor } });
 /// `keep` false: only what the residuals would be.
 export async function georeference(held: Held, points: readonly Click[], keep: boolean): Promise<Held> {
   const { body, etag } = await call('put', '/floors/{id}/plan/georeference', {
@@ -54,7 +56,10 @@ export async function georeference(held: Held, points: readonly Click[], keep: b
   return { floor: body, etag };
 }
 export async function trace(held: Held): Promise<Trace> {
-  await exchange('POST', `/floors/${held.floor.id}/plan/trace`, undefined, { Prefer: 'wait=120', ...made() });
+  await call('post', '/floors/{id}/plan/trace', {
+    path: { id: held.floor.id },
+    headers: { Prefer: 'wait=120', ...made() },
+  });
   return get('/floors/{id}/plan/trace', { path: { id: held.floor.id } });
 }
 export async function accept_trace(held: Held, material: Material): Promise<void> {

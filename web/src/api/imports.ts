@@ -1,7 +1,7 @@
 /// A flight into this server, as a mission of its own that is finished when all rows are in.
-import { ApiError, idempotency_key, request } from './client';
-import { call, type Wire } from './contract';
-import { num, obj, str } from '../live/messages';
+import { ApiError, idempotency_key } from './client';
+import { call, type Answered, type Wire } from './contract';
+import { count, elements, num, obj, str, type Said } from '../live/messages';
 
 const BATCH = 5000; ///< rows in a request: some hundred kilobytes
 export interface Sent {
@@ -13,11 +13,14 @@ export interface Sent {
 }
 
 /// What became of rows. Where not one was taken it comes as a problem (422) with the same members.
-export async function row_report(sending: Promise<unknown>): Promise<unknown> {
+export async function row_report(
+  sending: Promise<Pick<Answered<Said<Wire<'IngestAnswer'>>>, 'body'>>,
+): Promise<Said<Wire<'IngestAnswer'>>> {
   try {
-    return await sending;
+    return (await sending).body;
   } catch (e) {
-    if (e instanceof ApiError && num(obj(e.body)?.rejected) !== null) return e.body;
+    const refused = e instanceof ApiError ? (e.body as Said<Wire<'IngestProblem'>>) : null;
+    if (num(obj(refused)?.rejected) !== null) return refused;
     throw e;
   }
 }
@@ -71,15 +74,16 @@ export async function send_flight(
         const part = rows.slice(i, i + BATCH),
           answer = obj(
             await row_report(
-              request('POST', `${path}?mission=${body.id}`, part.map((r) => JSON.stringify(r)).join('\n') + '\n', {
-                'Content-Type': 'application/x-ndjson',
-                'Idempotency-Key': idempotency_key(),
+              call('post', path, {
+                query: { mission: body.id },
+                file: { type: 'application/x-ndjson', data: part.map((r) => JSON.stringify(r)).join('\n') + '\n' },
+                headers: { 'Idempotency-Key': idempotency_key() },
               }),
             ),
           );
-        accepted += num(answer?.accepted) ?? 0;
-        rejected += num(answer?.rejected) ?? 0;
-        const first = obj(Array.isArray(answer?.errors) ? answer.errors[0] : null);
+        accepted += count(answer?.accepted);
+        rejected += count(answer?.rejected);
+        const first = obj(elements(answer?.errors)[0]);
         first_reason ||= str(first?.detail) || str(first?.code);
         progress((done += part.length) / (fixes.length + ranges.length));
       }

@@ -1,7 +1,8 @@
 /// Stored ranges and campaign samples, as the Measurements view shows them: one shape for both, truth and features where they are known.
-import { num, obj, str } from '../live/messages';
+import { num, obj, objects, str, type Said } from '../live/messages';
 import type { RangeClass } from '../state/scene';
-import { api_url, request } from './client';
+import { get, given, list, url, type Wire } from './contract';
+import type { operations } from './generated/schema';
 
 export type Source = { readonly kind: 'mission' | 'campaign'; readonly id: string; readonly name: string };
 /// What the promoted models make of one; null where they were not asked.
@@ -35,16 +36,17 @@ export interface Impulse {
 const DW1000_TAP_NS = 1.0016; ///< 1/(2 x 499.2 MHz): the spacing where a response names none
 const FEATURE_MAX = 40;
 
-function features_of(v: unknown): Record<string, number> {
+function features_of(v: Said<Wire<'Features'>>): Record<string, number> {
   const known = Object.entries(obj(v) ?? {}).filter((e): e is [string, number] => num(e[1]) !== null);
   return Object.fromEntries(known.slice(0, FEATURE_MAX));
 }
-function predicted_of(v: unknown): Predicted | null {
+function predicted_of(v: Said<Wire<'PredictedClass'>>): Predicted | null {
   const o = obj(v),
     cls = str(o?.class);
   return cls === 'los' || cls === 'nlos' || cls === 'unclear' ? { cls, p_los: num(o?.p_los) } : null;
 }
-function range_of(o: Record<string, unknown>): Sample | null {
+type Row<T> = Exclude<Said<T>, null | undefined>;
+function range_of(o: Row<Wire<'Range'>>): Sample | null {
   const id = num(o.id),
     distance_m = num(o.distance_m),
     truth = obj(o.truth),
@@ -59,12 +61,12 @@ function range_of(o: Record<string, unknown>): Sample | null {
     rx_dbm,
     truth_m: num(truth?.distance_m),
     los: typeof truth?.los === 'boolean' ? truth.los : null,
-    has_cir: 'kurtosis' in features || o.has_cir === true,
+    has_cir: 'kurtosis' in features,
     features,
     predicted: predicted_of(o.predicted),
   };
 }
-function sample_of(o: Record<string, unknown>): Sample | null {
+function sample_of(o: Row<Wire<'CampaignSample'>>): Sample | null {
   const id = num(o.id),
     distance_m = num(o.range_m),
     truth = obj(o.truth);
@@ -111,30 +113,39 @@ export const EVERYTHING: Filter = {
   until_us: null,
 };
 
+type RangesQuery = NonNullable<operations['listRanges']['parameters']['query']>;
+type SamplesQuery = NonNullable<operations['listCampaignSamples']['parameters']['query']>;
+type Paging = Pick<RangesQuery & SamplesQuery, 'limit' | 'features' | 'predicted' | 'every' | 'cursor'>;
+type Common = Pick<
+  RangesQuery & SamplesQuery,
+  'label' | 'class' | 'min_distance_m' | 'max_distance_m' | 'min_level_dbm' | 'max_level_dbm'
+>;
+/// What both kinds of source know.
+const common = (f: Filter): Common =>
+  given<Common>({
+    label: f.label,
+    class: f.cls,
+    min_distance_m: f.min_m,
+    max_distance_m: f.max_m,
+    min_level_dbm: f.min_dbm,
+    max_level_dbm: f.max_dbm,
+  });
 /// A filter as the server's query. Time and fix are of flights only: a campaign is of places.
-export function query_of(source: Source, f: Filter): URLSearchParams {
-  const query = new URLSearchParams(),
-    flight = source.kind === 'mission',
-    put = (key: string, v: string | number | null): void => {
-      if (v !== null && v !== '') query.set(key, String(v));
-    };
-  if (flight) {
-    put('mission', source.id);
-    put('since', f.since_us);
-    put('until', f.until_us);
-    put('fix', f.fix);
-  }
-  put(flight ? 'anchor' : f.by, f.who);
-  put('label', f.label);
-  put('class', f.cls);
-  put('min_distance_m', f.min_m);
-  put('max_distance_m', f.max_m);
-  put('min_level_dbm', f.min_dbm);
-  put('max_level_dbm', f.max_dbm);
-  return query;
-}
-const path_of = (source: Source): string =>
-  source.kind === 'mission' ? '/ranges' : `/campaigns/${encodeURIComponent(source.id)}/samples`;
+export const ranges_query = (mission: string, f: Filter): RangesQuery =>
+  given<RangesQuery>({
+    mission,
+    since: f.since_us === null ? null : String(f.since_us),
+    until: f.until_us === null ? null : String(f.until_us),
+    fix: f.fix,
+    anchor: f.who,
+    ...common(f),
+  });
+export const samples_query = (f: Filter): SamplesQuery =>
+  given<SamplesQuery>({
+    environment: f.by === 'environment' ? f.who : '',
+    setting: f.by === 'setting' ? f.who : '',
+    ...common(f),
+  });
 
 export interface Wanted {
   readonly limit: number;
@@ -143,46 +154,41 @@ export interface Wanted {
   readonly every: number;
 }
 export async function page_of(source: Source, filter: Filter, w: Wanted): Promise<Page> {
-  const query = query_of(source, filter);
-  for (const [k, v] of [
-    ['limit', String(w.limit)],
-    ['features', 'true'],
-    ['predicted', 'true'],
-  ])
-    query.set(k!, v!);
-  if (w.every > 1) query.set('every', String(w.every));
-  if (w.cursor) query.set('cursor', w.cursor);
-  if (source.kind === 'mission' && !w.oldest_first) query.set('sort', '-t_us');
-  const answer = obj(await request('GET', `${path_of(source)}?${query}`)),
-    items = Array.isArray(answer?.items) ? answer.items : [];
-  const read = source.kind === 'mission' ? range_of : sample_of;
-  return {
-    samples: items
-      .map(obj)
-      .map((o) => o && read(o))
-      .filter((s): s is Sample => s !== null),
-    next: str(answer?.next_cursor) || null,
-  };
+  const more = given<Paging>({
+    limit: w.limit,
+    features: true,
+    predicted: true,
+    every: w.every > 1 ? w.every : null,
+    cursor: w.cursor,
+  });
+  const pick = <T>(rows: readonly T[], read: (o: Row<T>) => Sample | null): Sample[] =>
+    objects<Said<T>>(rows as readonly Said<T>[])
+      .map((o) => read(o as Row<T>))
+      .filter((s) => s !== null);
+  if (source.kind === 'mission') {
+    const sort = w.oldest_first ? {} : ({ sort: '-t_us' } as const),
+      page = await get('/ranges', { query: { ...ranges_query(source.id, filter), ...more, ...sort } });
+    return { samples: pick(page.items, range_of), next: page.next_cursor || null };
+  }
+  const page = await get('/campaigns/{id}/samples', {
+    path: { id: source.id },
+    query: { ...samples_query(filter), ...more },
+  });
+  return { samples: pick(page.items, sample_of), next: page.next_cursor || null };
 }
 /// Rows of a flight that pass what is stored; the class by the models is not, and campaigns are not counted.
 export async function count_of(source: Source, filter: Filter): Promise<number | null> {
   if (source.kind !== 'mission') return null;
-  const query = query_of(source, { ...filter, cls: '' });
-  query.set('count', 'exact');
-  query.set('limit', '1');
-  return num(obj(await request('GET', `/ranges?${query}`))?.total);
+  const query = { ...ranges_query(source.id, { ...filter, cls: '' }), count: 'exact', limit: 1 } as const;
+  return num((await get('/ranges', { query })).total);
 }
-export async function campaigns(): Promise<Source[]> {
-  const answer = obj(await request('GET', '/campaigns?limit=200')),
-    items = Array.isArray(answer?.items) ? answer.items : [];
-  return items
-    .map(obj)
-    .filter((o) => o !== null && str(o.id) !== '')
-    .map((o) => ({ kind: 'campaign', id: str(o!.id), name: str(o!.name) }));
-}
+export const campaigns = async (): Promise<Source[]> =>
+  objects(await list('/campaigns', { query: { limit: 200 } }))
+    .filter((o) => str(o.id) !== '')
+    .map(({ id, name }) => ({ kind: 'campaign', id, name }));
 
 /// Base64 of int16 pairs re, im, little endian, as the server keeps what the radio gave.
-export function impulse_of(answer: unknown): Impulse | null {
+export function impulse_of(answer: Said<Wire<'Cir'>>): Impulse | null {
   const o = obj(answer),
     raw = atob(str(o?.b64));
   const bytes = new DataView(Uint8Array.from(raw, (c) => c.charCodeAt(0)).buffer),
@@ -194,14 +200,15 @@ export function impulse_of(answer: unknown): Impulse | null {
     ? { tap_ns: dt_ps ? dt_ps / 1000 : DW1000_TAP_NS, first_path: num(o?.first_path_idx), magnitude }
     : null;
 }
-export async function impulse(source: Source, id: number): Promise<Impulse | null> {
-  const of = source.kind === 'mission' ? `/ranges/${id}` : `/campaigns/${encodeURIComponent(source.id)}/samples/${id}`;
-  return impulse_of(await request('GET', `${of}/cir`));
-}
+export const impulse = async (source: Source, id: number): Promise<Impulse | null> =>
+  impulse_of(
+    source.kind === 'mission'
+      ? await get('/ranges/{id}/cir', { path: { id } })
+      : await get('/campaigns/{id}/samples/{sample}/cir', { path: { id: source.id, sample: id } }),
+  );
 
 /// Exactly what is filtered, streamed by the server into a file.
-export function download_url(source: Source, filter: Filter, format: 'csv' | 'ndjson'): string {
-  const query = query_of(source, filter);
-  query.set('format', format);
-  return api_url(`${path_of(source)}?${query}`);
-}
+export const download_url = (source: Source, filter: Filter, format: 'csv' | 'ndjson'): string =>
+  source.kind === 'mission'
+    ? url('/ranges', { query: { ...ranges_query(source.id, filter), format } })
+    : url('/campaigns/{id}/samples', { path: { id: source.id }, query: { ...samples_query(filter), format } });

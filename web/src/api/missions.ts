@@ -1,6 +1,6 @@
 /// Stored flights: deleting one puts it into a bin, from which it comes back whole.
-import { api_url, idempotency_key } from './client';
-import { call, get, list, type Wire } from './contract';
+import { idempotency_key } from './client';
+import { call, get, list, url, type Wire } from './contract';
 import { release_control, take_control } from './flight';
 
 export type StoredFlight = Wire<'Mission'>;
@@ -27,7 +27,7 @@ export const restore_flight = (id: string): Promise<unknown> =>
   call('post', '/missions/{id}/restore', { ...at(id), headers: { 'Idempotency-Key': idempotency_key() } });
 
 /// What is handed over after a flight, in one signed zip file, which the server names: the bundle, the report and the published anchors.
-export const handover_url = (id: string): string => api_url(`/missions/${encodeURIComponent(id)}/handover`);
+export const handover_url = (id: string): string => url('/missions/{id}/handover', at(id));
 
 export const devices_of = async (id: string): Promise<Devices | null> =>
   (await get('/missions/{id}', at(id))).devices ?? null;

@@ -1,7 +1,7 @@
 /// Plans: what is to be flown. Corners and waypoints in WGS84, as the server keeps them.
-import { num, obj, str, vec3 } from '../live/messages';
-import { api_url, idempotency_key, request } from './client';
-import { call, type Wire } from './contract';
+import { elements, num, obj, objects, str, texts, vec3, type Said } from '../live/messages';
+import { idempotency_key } from './client';
+import { call, get, list, url, type Wire } from './contract';
 import { LIMITS } from './generated/limits';
 
 export interface Corner {
@@ -26,6 +26,21 @@ export type NumberSetting = {
 }[keyof typeof SETTINGS];
 export const setting = (p: Plan, key: NumberSetting): number => p.settings[key] ?? SETTINGS[key].default;
 const BUILDING_HEIGHT_M = LIMITS.PlanBody.building_height_m.default;
+type PlanBody = Wire<'PlanBody'>;
+type Edited =
+  | 'id'
+  | 'revision'
+  | 'name'
+  | 'outline'
+  | 'no_fly'
+  | 'fence'
+  | 'building_height_m'
+  | 'settings'
+  | 'expected_anchors'
+  | 'anchor_targets'
+  | 'waypoints'
+  | 'created_at'
+  | 'changed_at';
 export interface Plan {
   readonly id: string | null;
   readonly revision: number;
@@ -38,7 +53,7 @@ export interface Plan {
   readonly expected: readonly string[];
   readonly targets: Readonly<Record<string, number>>; ///< sigma in metres of anchors with one of their own
   readonly waypoints: readonly Waypoint[];
-  readonly rest: Readonly<Record<string, unknown>>; ///< what this page does not edit, kept as it came
+  readonly rest: Readonly<Omit<PlanBody, Edited>>; ///< what this page does not edit, kept as it came
 }
 export type Issue = Pick<Wire<'PlanIssue'>, 'severity' | 'code' | 'pointer' | 'text'>;
 /// An anchor assumed in the building: where, about the plan's origin, and what the flight would make of it.
@@ -70,18 +85,18 @@ export const EMPTY: Plan = {
   rest: {},
 };
 
-const list = (v: unknown): Record<string, unknown>[] => (Array.isArray(v) ? v.map(obj).filter((o) => o !== null) : []);
 /// A GeoJSON ring closes itself; the page works with open ones.
-function ring_of(polygon: unknown): Corner[] {
-  const rings = obj(polygon)?.coordinates,
-    ring = Array.isArray(rings) && Array.isArray(rings[0]) ? (rings[0] as unknown[]) : [];
-  const corners = ring.flatMap((c) =>
-    Array.isArray(c) && num(c[0]) !== null && num(c[1]) !== null ? [{ lon: c[0] as number, lat: c[1] as number }] : [],
-  );
+function ring_of(polygon: Said<Wire<'GeoPolygon'>>): Corner[] {
+  const ring = elements(elements(obj(polygon)?.coordinates)[0]);
+  const corners = ring.flatMap((c) => {
+    const [lon, lat] = [num(elements(c)[0]), num(elements(c)[1])];
+    return lon !== null && lat !== null ? [{ lon, lat }] : [];
+  });
   const [first, last] = [corners[0], corners[corners.length - 1]];
   return corners.length > 1 && first!.lon === last!.lon && first!.lat === last!.lat ? corners.slice(0, -1) : corners;
 }
-function plan_of(o: Record<string, unknown>): Plan {
+function plan_of(answer: Said<Wire<'Plan'> | Wire<'PlanBody'>>): Plan {
+  const o: Said<PlanBody & { links: unknown }> = obj(answer);
   const {
     id,
     revision,
@@ -98,25 +113,25 @@ function plan_of(o: Record<string, unknown>): Plan {
     changed_at: _changed,
     links: _links,
     ...rest
-  } = o;
+  } = o ?? {};
   return {
     id: str(id) || null,
     revision: num(revision) ?? 0,
     name: str(name),
     outline: ring_of(outline),
-    no_fly: Array.isArray(no_fly) ? no_fly.map(ring_of) : [],
+    no_fly: elements(no_fly).map(ring_of),
     fence: ring_of(fence),
     building_height_m: num(building_height_m) ?? BUILDING_HEIGHT_M,
-    settings: obj(settings) ?? {},
-    rest,
-    expected: Array.isArray(expected_anchors) ? expected_anchors.filter((a): a is string => typeof a === 'string') : [],
+    settings: (obj(settings) ?? {}) as Settings,
+    rest: rest as Plan['rest'],
+    expected: texts(expected_anchors),
     targets: Object.fromEntries(
-      list(anchor_targets).flatMap((t) => {
+      objects(anchor_targets).flatMap((t) => {
         const sigma_m = num(t.target_sigma_m);
         return sigma_m === null ? [] : [[str(t.network_id), sigma_m]];
       }),
     ),
-    waypoints: list(waypoints).map((w) => ({
+    waypoints: objects(waypoints).map((w) => ({
       lon: num(w.lon) ?? 0,
       lat: num(w.lat) ?? 0,
       height_above_ground_m: num(w.height_above_ground_m) ?? 0,
@@ -128,22 +143,21 @@ function plan_of(o: Record<string, unknown>): Plan {
     })),
   };
 }
-const polygon = (corners: readonly Corner[]): object | null =>
+const polygon = (corners: readonly Corner[]): Wire<'GeoPolygon'> | null =>
   corners.length < 3 ? null : { type: 'Polygon', coordinates: [[...corners, corners[0]!].map((c) => [c.lon, c.lat])] };
 /// What this page does not edit goes back as it came.
-export const body_of = (p: Plan): Wire<'PlanBody'> =>
-  ({
-    ...p.rest,
-    name: p.name || 'Plan',
-    outline: polygon(p.outline),
-    no_fly: p.no_fly.map(polygon).filter((x) => x !== null),
-    fence: polygon(p.fence),
-    building_height_m: p.building_height_m,
-    settings: p.settings,
-    expected_anchors: p.expected,
-    anchor_targets: Object.entries(p.targets).map(([network_id, target_sigma_m]) => ({ network_id, target_sigma_m })),
-    waypoints: p.waypoints,
-  }) as Wire<'PlanBody'>;
+export const body_of = (p: Plan): Wire<'PlanWrite'> => ({
+  ...p.rest,
+  name: p.name || 'Plan',
+  outline: polygon(p.outline),
+  no_fly: p.no_fly.map(polygon).filter((x) => x !== null),
+  fence: polygon(p.fence),
+  building_height_m: p.building_height_m,
+  settings: p.settings,
+  expected_anchors: [...p.expected],
+  anchor_targets: Object.entries(p.targets).map(([network_id, target_sigma_m]) => ({ network_id, target_sigma_m })),
+  waypoints: [...p.waypoints],
+});
 
 const check_of = ({ predicted, ...check }: Wire<'PlanCheck'>): Check => ({
   ...check,
@@ -155,17 +169,20 @@ const check_of = ({ predicted, ...check }: Wire<'PlanCheck'>): Check => ({
   }),
 });
 
-export const plans = async (): Promise<Plan[]> =>
-  list(obj(await request('GET', '/plans?limit=100'))?.items).map(plan_of);
+export const plans = async (): Promise<Plan[]> => objects(await list('/plans', { query: { limit: 100 } })).map(plan_of);
+const held = (p: Plan): { readonly path: { readonly id: string }; readonly headers: Record<string, string> } => ({
+  path: { id: p.id ?? '' },
+  headers: { 'If-Match': `"p-${p.revision}"` },
+});
 export async function save(p: Plan): Promise<Plan> {
-  const answer = p.id
-    ? await request('PUT', `/plans/${p.id}`, body_of(p), { 'If-Match': `"p-${p.revision}"` })
-    : await request('POST', '/plans', body_of(p), { 'Idempotency-Key': idempotency_key() });
-  return plan_of(obj(answer) ?? {});
+  const body = body_of(p),
+    answer = p.id
+      ? await call('put', '/plans/{id}', { ...held(p), body })
+      : await call('post', '/plans', { body, headers: { 'Idempotency-Key': idempotency_key() } });
+  return plan_of(answer.body);
 }
-export const remove = (p: Plan): Promise<unknown> =>
-  request('DELETE', `/plans/${p.id}`, undefined, { 'If-Match': `"p-${p.revision}"` });
-export const read = async (id: string): Promise<Plan> => plan_of(obj(await request('GET', `/plans/${id}`)) ?? {});
+export const remove = (p: Plan): Promise<unknown> => call('delete', '/plans/{id}', held(p));
+export const read = async (id: string): Promise<Plan> => plan_of(await get('/plans/{id}', { path: { id } }));
 /// What a flight flies: the revision it was started with, or that it was changed to in the air.
 export const flown_plan = async (mission: string): Promise<Plan> =>
   plan_of((await call('get', '/missions/{id}/plan', { path: { id: mission } })).body.plan);
@@ -191,15 +208,16 @@ export async function generate(p: Plan): Promise<{ plan: Plan; check: Check }> {
   return { plan: { ...p, waypoints: plan_of(body.plan).waypoints }, check: check_of(body.check) };
 }
 export async function import_file(name: string, text: string): Promise<{ plan: Plan; notes: string[] }> {
-  const answer = obj(
-    await request('POST', `/plans/import?dry_run=true&name=${encodeURIComponent(name)}`, text, {
-      'Content-Type': text.trimStart().startsWith('<') ? 'application/vnd.google-earth.kml+xml' : 'application/json',
+  const { body } = await call('post', '/plans/import', {
+      query: { dry_run: true, name },
+      file: {
+        type: text.trimStart().startsWith('<') ? 'application/vnd.google-earth.kml+xml' : 'application/json',
+        data: text,
+      },
     }),
-  );
-  return {
-    plan: plan_of(obj(answer?.plan) ?? {}),
-    notes: Array.isArray(answer?.notes) ? answer.notes.filter((n): n is string => typeof n === 'string') : [],
-  };
+    answer = obj(body),
+    looked_at = answer && 'notes' in answer ? answer : null; // what is not stored comes with notes
+  return { plan: plan_of(looked_at?.plan), notes: texts(looked_at?.notes) };
 }
 export const export_url = (id: string, format: 'plan' | 'geojson'): string =>
-  api_url(`/plans/${id}/export?format=${format}`);
+  url('/plans/{id}/export', { path: { id }, query: { format } });

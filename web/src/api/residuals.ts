@@ -2,7 +2,7 @@
 import { vec3, type Vec3 } from '../live/messages';
 import { enu_from_geodetic } from '../map/enu';
 import type { AnchorRow } from './anchors';
-import { get, list, type Wire } from './contract';
+import { get, given, list, type Wire } from './contract';
 
 /// A row of the contract that has a residual, and where it came from.
 export interface Residual extends Omit<ResidualRow, 'network_id'> {
@@ -52,7 +52,7 @@ async function way_of(mission: string, anchor: Place): Promise<{ readonly way: W
   for (let page = 0; page < 3; page++) {
     const track: Wire<'Track'> = await get('/missions/{id}/track', {
         path: { id: mission },
-        query: { limit: 10000, ...(cursor ? { cursor } : {}) },
+        query: given({ limit: 10000, cursor }),
       }),
       { t_us: times = [], local_m } = track.properties;
     local = !!local_m;

@@ -1,8 +1,8 @@
 /// The server itself: who may use it, what was done, and how it fares.
 import { drone, type DroneMsg } from '../live/flight_messages';
-import { obj, str } from '../live/messages';
+import type { Topic } from '../live/stream';
 import { idempotency_key } from './client';
-import { call, get, list, type Wire } from './contract';
+import { call, get, list, of_program, type Wire } from './contract';
 
 export type Token = Wire<'Token'>;
 export type AuditLine = Wire<'Audit'>;
@@ -25,15 +25,7 @@ export async function create_token(name: string, role: Role): Promise<string> {
 export const revoke_token = (id: string): Promise<unknown> => call('delete', '/tokens/{id}', { path: { id } });
 export const audit = (): Promise<AuditLine[]> => list('/audit', { query: { limit: 100 } });
 
-/// Outside /api/v1: answers of the program, not of its data.
-async function plain(path: string): Promise<unknown> {
-  const answer = await fetch(new URL(path, document.baseURI.split('#')[0]), {
-    credentials: 'same-origin',
-    cache: 'no-cache',
-  });
-  return answer.json();
-}
-export const version = async (): Promise<Version> => (await plain('version')) as Version;
+export const version = (): Promise<Version> => of_program('/version');
 /// Whose clock stamps what devices say, and the aircraft; null where this server has none.
 export type ServerClock = NonNullable<Wire<'System'>['clock']>;
 export async function clock_and_drone(): Promise<{
@@ -41,13 +33,8 @@ export async function clock_and_drone(): Promise<{
   readonly drone: DroneMsg | null;
 }> {
   const system = await get('/system');
-  return { clock: system.clock ?? null, drone: drone(system.drone) };
+  const said: Topic<'procedure'>['drone'] = system.drone ?? null; // as the stream says it
+  return { clock: system.clock ?? null, drone: drone(said) };
 }
-export async function checks(): Promise<Check[]> {
-  const o = obj(await plain('readyz'));
-  return Object.entries(obj(o?.checks) ?? {}).map(([name, v]) => ({
-    name,
-    ok: v === 'ok' || v === true || str(obj(v)?.status) === 'ok',
-    text: typeof v === 'string' ? v : str(obj(v)?.detail) || str(obj(v)?.status),
-  }));
-}
+export const checks = async (): Promise<Check[]> =>
+  Object.entries((await of_program('/readyz')).checks ?? {}).map(([name, text]) => ({ name, ok: text === 'ok', text }));

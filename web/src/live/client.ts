@@ -1,6 +1,7 @@
 import { Whole } from './deltas';
-import { num, obj, str } from './messages';
+import { elements, num, obj, str, type Said } from './messages';
 import type { LinkState, LiveSink, LiveSource } from './source';
+import type { Received, Sent, TopicName, TopicParams } from './stream';
 
 /// The part of WebSocket that is used, so that tests can play the server.
 export interface Socket {
@@ -18,12 +19,10 @@ export interface Environment {
   after(ms: number, call: () => void): () => void; ///< returns its cancel
 }
 
-/// What a subscription asks for; asyncapi, sub.
-export interface TopicParams {
-  readonly max_hz?: number;
-  readonly max_age_s?: number;
-  readonly deltas?: boolean;
-}
+/// A message of the server before anybody has looked at more of it than its op.
+type Frame<Op extends Received['op']> = Op extends unknown
+  ? Exclude<Said<Extract<Received, { op: Op }>>, null | undefined> & { readonly op: Op }
+  : never;
 
 interface Topic {
   sub: number | null;
@@ -50,9 +49,9 @@ export class LiveClient implements LiveSource {
   private socket: Socket | null = null;
   private epoch: string | null = null;
   private offered: ReadonlySet<unknown> | null = null;
-  private readonly topics = new Map<string, Topic>();
-  private readonly by_sub = new Map<number, string>();
-  private readonly by_id = new Map<number, string>();
+  private readonly topics = new Map<TopicName, Topic>();
+  private readonly by_sub = new Map<number, TopicName>();
+  private readonly by_id = new Map<number, TopicName>();
   private next_id = 1;
   private opened_ms = 0;
   private heard_ms = -Infinity;
@@ -73,12 +72,12 @@ export class LiveClient implements LiveSource {
   private seen_ms = -Infinity; ///< when that was reported last
   private cancel_seen: (() => void) | null = null;
   private loss_open = false; ///< LOST was said, and not yet that it is over
-  private resume: { recovered: Map<string, number>; resynchronised: boolean; open: Set<string> } | null = null;
+  private resume: { recovered: Map<TopicName, number>; resynchronised: boolean; open: Set<TopicName> } | null = null;
 
   constructor(
-    topics: readonly string[],
+    topics: readonly TopicName[],
     private readonly env: Environment,
-    private readonly params: Readonly<Record<string, TopicParams>> = {},
+    private readonly params: Readonly<Partial<Record<TopicName, TopicParams>>> = {},
   ) {
     for (const t of topics) {
       const whole = params[t]?.deltas ? new Whole() : null;
@@ -204,7 +203,7 @@ export class LiveClient implements LiveSource {
     // Data that only came late needs no new connection; whoever was told LOST is told that it is over all the same.
     if (state === 'live' && this.loss_open && !this.resume) this.back(new Map(), false);
   }
-  private back(recovered: ReadonlyMap<string, number>, resynchronised: boolean): void {
+  private back(recovered: ReadonlyMap<TopicName, number>, resynchronised: boolean): void {
     this.loss_open = false;
     this.sink?.resumed(recovered, resynchronised);
   }
@@ -230,14 +229,14 @@ export class LiveClient implements LiveSource {
     this.cancel_seen?.();
     this.cancel_seen = null;
   }
-  private send(message: object): void {
+  private send(message: Sent): void {
     this.socket?.send(JSON.stringify(message));
   }
 
   private receive(text: unknown): void {
-    let message: Record<string, unknown> | null = null;
+    let message: Frame<Received['op']> | null = null;
     try {
-      message = typeof text === 'string' ? obj(JSON.parse(text)) : null;
+      message = typeof text === 'string' ? (obj(JSON.parse(text)) as Frame<Received['op']> | null) : null;
     } catch {
       /* counted below */
     }
@@ -270,7 +269,7 @@ export class LiveClient implements LiveSource {
     }
   }
 
-  private hello(m: Record<string, unknown>): void {
+  private hello(m: Frame<'hello'>): void {
     this.greeted = true;
     this.attempt = 0;
     const again = this.epoch !== null;
@@ -280,7 +279,7 @@ export class LiveClient implements LiveSource {
       for (const t of this.topics.values()) t.seq = null;
       this.sink?.restarted();
     }
-    const offered = (this.offered = Array.isArray(m.topics) ? new Set(m.topics) : null);
+    const offered = (this.offered = Array.isArray(m.topics) ? new Set(elements(m.topics)) : null);
     this.by_sub.clear();
     this.by_id.clear();
     const wanted = [...this.topics.keys()].filter((t) => !offered || offered.has(t));
@@ -291,10 +290,10 @@ export class LiveClient implements LiveSource {
     this.set_link('live');
     this.ask_time();
   }
-  offers(topic: string): boolean {
+  offers(topic: TopicName): boolean {
     return this.offered?.has(topic) ?? false;
   }
-  private subscribe(name: string): void {
+  private subscribe(name: TopicName): void {
     const topic = this.topics.get(name);
     if (!topic) return;
     const id = this.next_id++;
@@ -304,7 +303,7 @@ export class LiveClient implements LiveSource {
     const since = topic.seq !== null && this.epoch ? { since: { epoch: this.epoch, seq: topic.seq } } : {};
     this.send({ op: 'sub', id, topic: name, params: this.params[name] ?? {}, ...since });
   }
-  private ack(m: Record<string, unknown>): void {
+  private ack(m: Frame<'ack'>): void {
     const [id, sub] = [num(m.id), num(m.sub)];
     const name = id === null ? undefined : this.by_id.get(id);
     const topic = name === undefined ? undefined : this.topics.get(name);
@@ -320,7 +319,7 @@ export class LiveClient implements LiveSource {
     this.resume?.open.delete(name);
     // What is replayed follows its ack; the heartbeat after the last ack ends the count.
   }
-  private content(m: Record<string, unknown>): void {
+  private content(m: Frame<'snap' | 'data'>): void {
     const sub = num(m.sub);
     const name = sub === null ? undefined : this.by_sub.get(sub);
     const topic = name === undefined ? undefined : this.topics.get(name);
@@ -353,7 +352,7 @@ export class LiveClient implements LiveSource {
     this.sink?.data(name, data, t_us);
   }
   /// A jump that nobody announced: ask again from where we stand. Once in two seconds, else a broken server would be asked for ever.
-  private hole(name: string, topic: Topic): void {
+  private hole(name: TopicName, topic: Topic): void {
     this.counters.holes++;
     if (this.env.now_ms() - topic.resubscribed_ms < 2000) {
       topic.seq = null;
@@ -366,7 +365,7 @@ export class LiveClient implements LiveSource {
     }
     this.subscribe(name);
   }
-  private gap(m: Record<string, unknown>): void {
+  private gap(m: Frame<'gap'>): void {
     const sub = num(m.sub);
     const name = sub === null ? undefined : this.by_sub.get(sub);
     const topic = name === undefined ? undefined : this.topics.get(name);
@@ -374,7 +373,7 @@ export class LiveClient implements LiveSource {
     topic.seq = Math.max(topic.seq ?? 0, num(m.to_seq) ?? 0);
     this.sink?.gap(name, num(m.dropped) ?? 0);
   }
-  private heartbeat(m: Record<string, unknown>): void {
+  private heartbeat(m: Frame<'hb'>): void {
     const t_us = num(m.t_us);
     if (t_us !== null) {
       this.clock_bounds(t_us - this.env.wall_us(), null);
@@ -387,7 +386,7 @@ export class LiveClient implements LiveSource {
       this.back(recovered, resynchronised);
     }
   }
-  private time(m: Record<string, unknown>): void {
+  private time(m: Frame<'time'>): void {
     const [c_us, t_us] = [num(m.c_us), num(m.t_us)];
     if (c_us === null || t_us === null) return;
     const now = this.env.wall_us();
@@ -403,7 +402,7 @@ export class LiveClient implements LiveSource {
     if (stepped) this.most = null;
     if (most_us !== null && (most === null || most_us < most || stepped)) this.most = { us: most_us, at_ms };
   }
-  private error(m: Record<string, unknown>): void {
+  private error(m: Frame<'err'>): void {
     const id = num(m.id);
     const name = id === null ? undefined : this.by_id.get(id);
     if (id === null || name === undefined) return;

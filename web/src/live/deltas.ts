@@ -1,6 +1,7 @@
 /// Estimates come whole once, then as what changed of them (asyncapi: sub, params.deltas). Put together again here, so that nothing behind the
 /// client knows of it. No DOM.
-import { obj, str } from './messages';
+import { obj, said, str } from './messages';
+import type { Topic } from './stream';
 
 type Obj = Readonly<Record<string, unknown>>;
 
@@ -35,7 +36,7 @@ export class Whole {
     const out: Obj[] = [];
     for (const o of this.list(data)) {
       const before = this.known.get(this.key(o));
-      if (!before && !('status' in o)) return null;
+      if (!before && said<Topic<'anchors.estimates'>>(o)?.status === undefined) return null;
       const now = before ? merged(before, o) : o;
       this.known.set(this.key(o), now);
       out.push(now);
@@ -46,6 +47,7 @@ export class Whole {
     return (Array.isArray(data) ? data : [data]).map(obj).filter((o) => o !== null);
   }
   private key(o: Obj): string {
-    return `${str(o.mission)} ${str(o.anchor)}`;
+    const of = said<Topic<'anchors.estimates'>>(o);
+    return `${str(of?.mission)} ${str(of?.anchor)}`;
   }
 }

@@ -1,7 +1,31 @@
 /// What the stream tells of the flight itself: procedure, the planner's last decision, the priors of a turn or a height search. Same rules as messages.ts.
-import { num, obj, str, vec3, type Vec3 } from './messages';
+import {
+  count,
+  elements,
+  num,
+  obj,
+  objects,
+  said,
+  str,
+  texts,
+  vec3,
+  word,
+  words_of,
+  type Said,
+  type Vec3,
+} from './messages';
+import type { Topic } from './stream';
 
-export const STEPS = [
+type Procedure = Topic<'procedure'>;
+type Grid = Topic<'mission.grid'>;
+type Aircraft = NonNullable<Procedure['drone']>;
+type Command = Procedure['commands'][number];
+type Task = Procedure['anchors'][number];
+
+export type Step = Procedure['step'];
+export type FlightStatus = Procedure['status'];
+export type CommandState = Command['state'];
+export const STEPS = words_of<Step>()(
   'ready',
   'take_off',
   'go_to_waypoint',
@@ -19,10 +43,10 @@ export const STEPS = [
   'return_home',
   'landing',
   'done',
-] as const;
-export type Step = (typeof STEPS)[number];
-export type FlightStatus = 'ready' | 'running' | 'hold' | 'return' | 'landing' | 'done' | 'aborted';
-export type CommandState = 'sent' | 'accepted' | 'refused' | 'unconfirmed';
+);
+const MODE = words_of<Procedure['mode']>()('auto', 'manual'),
+  STATUS = words_of<FlightStatus>()('ready', 'running', 'hold', 'return', 'landing', 'done', 'aborted'),
+  COMMAND = words_of<CommandState>()('sent', 'accepted', 'refused', 'unconfirmed');
 
 export interface Spot {
   readonly lon: number;
@@ -30,81 +54,64 @@ export interface Spot {
   readonly height_m: number | null;
   readonly plan_m: Vec3 | null;
 }
-export interface CommandMsg {
-  readonly number: number;
-  readonly action: string;
-  readonly state: CommandState;
-  readonly text: string;
-  readonly by: string;
-  readonly t_us: number;
-}
-export interface AnchorTask {
+export type CommandMsg = Readonly<Command>;
+export interface AnchorTask extends Readonly<Pick<Task, 'done' | 'why' | 'iterations'>> {
   readonly anchor: string;
-  readonly done: boolean;
   readonly reached: boolean; // its accuracy; done without it: given up, or accepted by a person
   readonly ended_by: string; // the person who accepted it or gave it up; empty: nobody did
   readonly accepted: boolean;
   readonly target_sigma_m: number | null; // its own, or that of the plan
-  readonly why: string;
-  readonly iterations: number;
   readonly at_edge: boolean;
   readonly no_lobe: boolean;
 }
-export interface DroneMsg {
-  readonly connected: boolean;
-  readonly silent_s: number | null;
+export interface DroneMsg extends Readonly<Omit<Aircraft, Unread | 'streams_refused' | 'others' | 'gps_fix'>> {
   readonly gps_fix: number | null;
-  readonly mode: string;
-  readonly armed: boolean;
-  readonly in_air: boolean;
-  readonly taken_over: boolean;
-  readonly failsafe: boolean;
-  readonly battery: number | null;
-  readonly above_home_m: number | null;
-  readonly text: string;
-  readonly autopilot: string;
-  readonly peer: string;
-  readonly link_signed: boolean;
-  readonly frames_refused: number;
   readonly streams_refused: readonly string[];
   readonly others: readonly OtherOnLink[];
 }
-export interface OtherOnLink {
-  readonly sender: string;
-  readonly system: number;
-  readonly component: number;
+/// Of the aircraft, what the page does not show.
+type Unread =
+  | 'lon'
+  | 'lat'
+  | 'heading_deg'
+  | 'speed_mps'
+  | 'battery_v'
+  | 'battery_age_s'
+  | 'position_age_s'
+  | 'stale'
+  | 'ready_to_arm'
+  | 'not_ready';
+export interface OtherOnLink extends Readonly<
+  Pick<Aircraft['others'][number], 'sender' | 'system' | 'component' | 'frames'>
+> {
   readonly kind: string;
-  readonly frames: number;
   readonly silent_s: number | null;
 }
-export interface ControlMsg {
-  readonly holder: string;
-  readonly since_us: number;
-  readonly expires_us: number;
-}
-export interface ProcedureMsg {
-  readonly mission: string;
-  readonly t_us: number;
-  readonly plan: string | null;
-  readonly plan_name: string;
-  readonly plan_revision: number;
+export type ControlMsg = Readonly<NonNullable<Procedure['control']>>;
+type ProcedureFields =
+  | 'mission'
+  | 't_us'
+  | 'plan'
+  | 'plan_name'
+  | 'plan_revision'
+  | 'mode'
+  | 'status'
+  | 'step'
+  | 'reason'
+  | 'waypoint'
+  | 'n_waypoints'
+  | 'iteration';
+export interface ProcedureMsg extends Readonly<Pick<Procedure, ProcedureFields>> {
   readonly plan_saved_revision: number | null; // newest that was saved since the start; none: null
   readonly plan_undo_revision: number | null; // flown before the last change
-  readonly mode: 'auto' | 'manual';
-  readonly status: FlightStatus;
-  readonly step: Step;
-  readonly reason: string;
   readonly in_step_s: number | null;
   readonly step_limit_s: number | null;
   readonly ended: string;
   readonly elapsed_s: number | null;
   readonly target_sigma_m: number | null; // of the position, 1 sigma: an anchor within it is done
   readonly forecast_s: { readonly low: number; readonly high: number } | null;
-  readonly waypoint: number;
-  readonly n_waypoints: number;
   readonly part: number;
   readonly k: number;
-  readonly iteration: number;
   readonly target: (Spot & { readonly heading_deg: number | null }) | null;
   readonly distance_m: number | null;
   readonly anchors: readonly AnchorTask[];
@@ -119,44 +126,30 @@ export interface Candidate extends Spot {
   readonly p_nlos: number | null;
   readonly refused: string | null;
 }
-export interface GridMsg {
-  readonly mission: string;
-  readonly t_us: number;
-  readonly iteration: number;
+type GridFields =
+  'mission' | 't_us' | 'iteration' | 'chosen' | 'value_before' | 'predicted' | 'reached' | 'reason' | 'outcome';
+export interface GridMsg extends Readonly<Pick<Grid, GridFields>> {
   readonly rule: string;
   readonly candidates: readonly Candidate[];
-  readonly chosen: number | null;
-  readonly value_before: number | null;
-  readonly predicted: number | null;
-  readonly reached: number | null;
-  readonly reason: string;
-  readonly outcome: string;
   readonly visited_plan_m: readonly Vec3[];
 }
 /// RSS over heading (degrees) or over height (metres) of one anchor.
-export interface ProfileMsg {
-  readonly mission: string;
-  readonly anchor: string;
-  readonly t_us: number;
-  readonly running: boolean;
+export interface ProfileMsg extends Readonly<Pick<Topic<'mission.turn'>, 'mission' | 'anchor' | 't_us' | 'running'>> {
   readonly samples: readonly (readonly [number, number])[];
   readonly best: number | null;
   readonly sigma: number | null;
 }
 
-const word = <T extends string>(v: unknown, words: readonly T[], otherwise: T): T =>
-  words.includes(v as T) ? (v as T) : otherwise;
-const count = (v: unknown): number => num(v) ?? 0;
-const list = (v: unknown): Record<string, unknown>[] =>
-  Array.isArray(v) ? v.map(obj).filter((o): o is Record<string, unknown> => o !== null) : [];
-function spot(o: Record<string, unknown> | null): Spot | null {
-  const [lon, lat] = [num(o?.lon), num(o?.lat)];
+type Point = Grid['candidates'][number];
+function spot(v: Said<Pick<Point, 'lon' | 'lat' | 'height_above_ground_m' | 'enu_m'>>): Spot | null {
+  const o = obj(v),
+    [lon, lat] = [num(o?.lon), num(o?.lat)];
   return lon === null || lat === null
     ? null
     : { lon, lat, height_m: num(o?.height_above_ground_m), plan_m: vec3(o?.enu_m) };
 }
 
-export function drone(v: unknown): DroneMsg | null {
+export function drone(v: Said<Aircraft>): DroneMsg | null {
   const d = obj(v);
   return (
     d && {
@@ -175,10 +168,8 @@ export function drone(v: unknown): DroneMsg | null {
       peer: str(d.peer),
       link_signed: d.link_signed === true,
       frames_refused: count(d.frames_refused),
-      streams_refused: Array.isArray(d.streams_refused)
-        ? d.streams_refused.filter((s): s is string => typeof s === 'string')
-        : [],
-      others: list(d.others).map((o) => ({
+      streams_refused: texts(d.streams_refused),
+      others: objects(d.others).map((o) => ({
         sender: str(o.sender),
         system: count(o.system),
         component: count(o.component),
@@ -190,9 +181,9 @@ export function drone(v: unknown): DroneMsg | null {
   );
 }
 export function procedure(v: unknown): ProcedureMsg | null {
-  const o = obj(v);
+  const o = said<Procedure>(v);
   if (!o || !str(o.mission)) return null;
-  const target = spot(obj(o.target)),
+  const target = spot(o.target),
     alarm = obj(o.alarm),
     forecast = obj(o.forecast_s),
     c = obj(o.control);
@@ -204,8 +195,8 @@ export function procedure(v: unknown): ProcedureMsg | null {
     plan_revision: count(o.plan_revision),
     plan_saved_revision: num(o.plan_saved_revision),
     plan_undo_revision: num(o.plan_undo_revision),
-    mode: word(o.mode, ['auto', 'manual'] as const, 'auto'),
-    status: word(o.status, ['ready', 'running', 'hold', 'return', 'landing', 'done', 'aborted'] as const, 'ready'),
+    mode: word(o.mode, MODE, 'auto'),
+    status: word(o.status, STATUS, 'ready'),
     step: word(o.step, STEPS, 'ready'),
     reason: str(o.reason),
     in_step_s: num(o.in_step_s),
@@ -221,7 +212,7 @@ export function procedure(v: unknown): ProcedureMsg | null {
     iteration: count(o.iteration),
     target: target && { ...target, heading_deg: num(obj(o.target)?.heading_deg) },
     distance_m: num(o.distance_m),
-    anchors: list(o.anchors).map((a) => ({
+    anchors: objects(o.anchors).map((a) => ({
       anchor: str(a.network_id),
       done: a.done === true,
       reached: a.reached === true,
@@ -237,10 +228,10 @@ export function procedure(v: unknown): ProcedureMsg | null {
     alarm: alarm && { id: str(alarm.id), reaction: str(alarm.reaction), text: str(alarm.text) },
     drone: drone(o.drone),
     control: c && { holder: str(c.holder), since_us: count(c.since_us), expires_us: count(c.expires_us) },
-    commands: list(o.commands).map((x) => ({
+    commands: objects(o.commands).map((x) => ({
       number: count(x.number),
       action: str(x.action),
-      state: word(x.state, ['sent', 'accepted', 'refused', 'unconfirmed'] as const, 'sent'),
+      state: word(x.state, COMMAND, 'sent'),
       text: str(x.text),
       by: str(x.by),
       t_us: count(x.t_us),
@@ -248,9 +239,9 @@ export function procedure(v: unknown): ProcedureMsg | null {
   };
 }
 export function grid(v: unknown): GridMsg | null {
-  const o = obj(v);
+  const o = said<Grid>(v);
   if (!o || !str(o.mission)) return null;
-  const candidates = list(o.candidates).map((c) => {
+  const candidates = objects(o.candidates).map((c) => {
     const at = spot(c);
     return at && { ...at, value: num(c.value), p_nlos: num(c.p_nlos), refused: str(c.refused) || null };
   });
@@ -267,26 +258,33 @@ export function grid(v: unknown): GridMsg | null {
     reached: num(o.reached),
     reason: str(o.reason),
     outcome: str(o.outcome),
-    visited_plan_m: (Array.isArray(o.visited) ? o.visited : []).map(vec3).filter((x): x is Vec3 => x !== null),
+    visited_plan_m: elements(o.visited)
+      .map((at) => vec3(at))
+      .filter((x): x is Vec3 => x !== null),
   };
 }
-const profile =
-  (best: string, sigma: string) =>
-  (v: unknown): ProfileMsg | null => {
-    const o = obj(v);
-    if (!o || !str(o.mission) || !str(o.anchor)) return null;
-    const samples = (Array.isArray(o.samples) ? o.samples : []).flatMap((s): [number, number][] =>
-      Array.isArray(s) && num(s[0]) !== null && num(s[1]) !== null ? [[s[0] as number, s[1] as number]] : [],
-    );
-    return {
-      mission: str(o.mission),
-      anchor: str(o.anchor),
-      t_us: count(o.t_us),
-      running: o.running === true,
-      samples,
-      best: num(o[best]),
-      sigma: num(o[sigma]),
-    };
+type Profile = Topic<'mission.turn'> | Topic<'mission.height'>;
+function profile(o: Said<Profile>, best: number | null, sigma: number | null): ProfileMsg | null {
+  if (!o || !str(o.mission) || !str(o.anchor)) return null;
+  const samples = elements(o.samples).flatMap((s): [number, number][] => {
+    const [at, level] = [num(elements(s)[0]), num(elements(s)[1])];
+    return at === null || level === null ? [] : [[at, level]];
+  });
+  return {
+    mission: str(o.mission),
+    anchor: str(o.anchor),
+    t_us: count(o.t_us),
+    running: o.running === true,
+    samples,
+    best,
+    sigma,
   };
-export const turn = profile('bearing_deg', 'sigma_deg');
-export const height = profile('height_m', 'sigma_m');
+}
+export function turn(v: unknown): ProfileMsg | null {
+  const o = said<Topic<'mission.turn'>>(v);
+  return profile(o, num(o?.bearing_deg), num(o?.sigma_deg));
+}
+export function height(v: unknown): ProfileMsg | null {
+  const o = said<Topic<'mission.height'>>(v);
+  return profile(o, num(o?.height_m), num(o?.sigma_m));
+}

@@ -1,181 +1,140 @@
 /// What the stream carries, and the guards that let it in. A message is `unknown` until a guard here has looked at it; a field that is missing or of
-/// the wrong kind becomes null ("unknown"), a message without its key fields is dropped and counted by the caller.
+/// the wrong kind becomes null ("unknown"), a message without its key fields is dropped and counted by the caller. Names and kinds are those of
+/// api/asyncapi.yaml (`stream`): a guard that reads something else does not compile.
+import type { Topic } from './stream';
 
 export type Vec3 = readonly [number, number, number];
-export type FixClass = 'none' | 'single' | 'dgps' | 'float' | 'fixed';
-/// Not on the wire are `gave_up`, where the procedure ended its work on the anchor without its accuracy, and those of a calibration: `withheld`, or
-/// `passes` its gates; and where the accuracy goal is known, `within_goal` or `over_goal` (state/done.ts).
+export type FixClass = Topic<'drone.pose'>['fix'];
+type Estimate = Topic<'anchors.estimates'>;
+/// Not on the wire are `accepted` and `moved`, of what is published; `gave_up`, where the procedure ended its work on the anchor without its accuracy;
+/// those of a calibration: `withheld`, or `passes` its gates; and where the accuracy goal is known, `within_goal` or `over_goal` (state/done.ts).
 export type AnchorStatus =
-  | 'found'
-  | 'estimating'
-  | 'converged'
-  | 'ambiguous'
-  | 'accepted'
-  | 'moved'
-  | 'gave_up'
-  | 'withheld'
-  | 'passes'
-  | 'within_goal'
-  | 'over_goal';
-export type Verdict = 'ok' | 'weak_geometry' | 'ambiguous' | 'too_few' | 'diverged';
+  Estimate['status'] | 'accepted' | 'moved' | 'gave_up' | 'withheld' | 'passes' | 'within_goal' | 'over_goal';
+export type Verdict = Estimate['verdict'];
 
-export interface Place {
-  readonly lon: number | null;
-  readonly lat: number | null;
-  readonly h_m: number | null;
-}
-export interface Ellipse95 {
-  readonly major_m: number;
-  readonly minor_m: number;
-  readonly azimuth_deg: number;
-}
+export type Place = Readonly<Pick<Estimate, 'lon' | 'lat' | 'h_m'>>;
+export type Ellipse95 = Readonly<NonNullable<Estimate['ellipse95']>>;
 
-export interface Pose extends Place {
-  readonly mission: string;
-  readonly t_us: number;
+type PoseFields = 'mission' | 't_us' | 'heading_deg' | 'fix' | 'speed_mps';
+export interface Pose extends Place, Readonly<Pick<Topic<'drone.pose'>, PoseFields>> {
   readonly enu_m: Vec3 | null;
   readonly tag_enu_m: Vec3 | null;
-  readonly heading_deg: number | null;
-  readonly fix: FixClass;
-  readonly sigma_m: Vec3 | null;
-  readonly speed_mps: number | null;
-}
-export interface Rtk {
-  readonly mission: string;
-  readonly t_us: number;
-  readonly fix: FixClass;
-  readonly satellites: number | null;
-  readonly correction_age_s: number | null;
   readonly sigma_m: Vec3 | null;
 }
-export interface RangeMsg {
-  readonly t_us: number;
-  readonly mission: string;
-  readonly tag: string;
-  readonly anchor: string;
-  readonly distance_m: number;
-  readonly corrected_m: number;
-  readonly sigma_m: number | null;
-  readonly rss_dbm: number | null;
-  readonly p_los: number | null;
-  readonly used: boolean;
-  readonly refused: string | null;
+type RtkFields = 'mission' | 't_us' | 'fix' | 'satellites' | 'correction_age_s';
+export interface Rtk extends Readonly<Pick<Topic<'rtk.status'>, RtkFields>> {
+  readonly sigma_m: Vec3 | null;
 }
+export type RangeMsg = Readonly<Omit<Topic<'ranges'>, 'tag_enu_m' | 'residual_m' | 'models'>>;
 export interface Mirror extends Place {
   readonly enu_m: Vec3 | null;
   readonly probability: number | null;
 }
-export interface EstimateMsg extends Place {
-  readonly mission: string;
-  readonly anchor: string;
-  readonly t_us: number;
+/// One acceptance test of the server: its number against its limit.
+export interface GateMsg extends Readonly<Omit<Estimate['gates'][number], 'limit'>> {
+  readonly limit: number | null;
+}
+type Shaped = 'status' | 'enu_m' | 'cov_enu_m2' | 'ellipse95' | 'mirror' | 'gates';
+export interface EstimateMsg extends Readonly<Omit<Estimate, Shaped | 'models_moved_m'>> {
   readonly status: AnchorStatus;
-  readonly verdict: Verdict;
-  readonly reason: string;
   readonly enu_m: Vec3 | null;
   readonly cov_enu_m2: readonly number[] | null; ///< ee, en, eu, nn, nu, uu
   readonly ellipse95: Ellipse95 | null;
-  readonly h95_m: number | null;
-  readonly v95_m: number | null;
-  readonly gdop: number | null;
-  readonly gdop_trace: number | null;
-  readonly n_ranges: number;
-  readonly n_refused: number;
-  readonly rms_residual_m: number | null;
-  readonly probability: number | null;
   readonly mirror: Mirror | null;
   readonly gates: readonly GateMsg[]; ///< what the server held it against, the accuracy goal last
 }
-/// One acceptance test of the server: its number against its limit.
-export interface GateMsg {
-  readonly name: string;
-  readonly value: number | null;
-  readonly limit: number | null;
-  readonly passed: boolean;
-  readonly why: string;
-}
-export interface MissionMsg {
-  readonly mission: string;
-  readonly name: string;
-  readonly state: 'planned' | 'recording' | 'finished';
-  readonly t_us: number;
-  readonly started_us: number | null;
-  readonly frame: 'wgs84' | 'local';
-  readonly origin: { readonly lon: number; readonly lat: number; readonly h_m: number } | null;
-  readonly n_ranges: number;
-  readonly n_fixes: number;
-  readonly anchors_found: number;
-  readonly anchors_converged: number;
+type State = Topic<'mission.state'>;
+export interface MissionMsg extends Readonly<Omit<State, 'origin' | 'range_rate_hz' | 'fixes_refused'>> {
+  readonly origin: Readonly<NonNullable<State['origin']>> | null;
   readonly range_rate_hz: number | null;
-  readonly fixes_refused: Readonly<Record<string, number>>; ///< by reason
+  readonly fixes_refused: Readonly<State['fixes_refused']>; ///< by reason
 }
-export interface DeviceMsg {
+export interface DeviceMsg extends Readonly<Pick<Topic<'devices'>, 'kind' | 'state' | 'last_seen_us'>> {
   readonly network_id: string;
-  readonly kind: string;
-  readonly state: 'live' | 'late' | 'lost';
-  readonly last_seen_us: number | null;
   readonly rate_hz: number | null;
 }
-export interface SystemMsg {
-  readonly t_us: number;
-  readonly recording: boolean;
-  readonly queue_depth: number | null;
-  readonly db_bytes: number | null;
-  readonly disk_free_bytes: number | null;
-  readonly ws_clients: number | null;
-  readonly synchronous: string;
-}
-export interface EventMsg {
-  readonly id: string;
-  readonly t_us: number;
-  readonly level: 'info' | 'warning' | 'critical';
-  readonly code: string;
-  readonly text: string;
-  readonly mission: string | null;
-}
-export interface AlarmMsg {
-  readonly id: string;
-  readonly priority: 'critical' | 'warning' | 'advisory';
-  readonly since_us: number;
-  readonly text: string;
-  readonly acknowledged: boolean;
-}
-export interface RevisionMsg {
-  readonly revision: number;
-  readonly t_us: number;
-  readonly calibration: string;
-}
+type Counted = 'queue_depth' | 'db_bytes' | 'disk_free_bytes' | 'ws_clients';
+export type SystemMsg = Readonly<Omit<Topic<'system'>, Counted>> & { readonly [K in Counted]: number | null };
+export type EventMsg = Readonly<Topic<'events'>>;
+export type AlarmMsg = Readonly<Omit<Topic<'alarms'>, 'mission'>>;
+export type RevisionMsg = Readonly<Topic<'revisions'>>;
 
 type Obj = Record<string, unknown>;
-export const obj = (v: unknown): Obj | null =>
-  typeof v === 'object' && v !== null && !Array.isArray(v) ? (v as Obj) : null;
-export const num = (v: unknown): number | null => (typeof v === 'number' && Number.isFinite(v) ? v : null);
-export const str = (v: unknown): string => (typeof v === 'string' ? v : '');
-const count = (v: unknown): number => num(v) ?? 0;
-const word = <T extends string>(v: unknown, words: readonly T[], otherwise: T): T =>
-  words.includes(v as T) ? (v as T) : otherwise;
+/// What the contract says of a message or an answer, until a guard has looked: a server of another version may leave any of it out. A member that the
+/// contract does not have, or has as something else than the guard reads, does not compile.
+export type Said<T> =
+  | (T extends readonly (infer E)[]
+      ? readonly Said<E>[]
+      : T extends object
+        ? { readonly [K in keyof T]?: Said<T[K]> }
+        : T)
+  | null
+  | undefined;
+/// What a guard may be given: its own kind in the words of the contract, or something that no contract speaks of.
+type Given<T, V> = unknown extends V ? unknown : T | null | undefined;
 
-export const fix_class = (v: unknown): FixClass => word(v, FIX, 'none');
-export function vec3(v: unknown): Vec3 | null {
+export const obj = <V>(v: V): (unknown extends V ? Obj : Extract<V, object>) | null =>
+  (typeof v === 'object' && v !== null && !Array.isArray(v) ? v : null) as ReturnType<typeof obj<V>>;
+export const num = <V>(v: V & Given<number, V>): number | null =>
+  typeof v === 'number' && Number.isFinite(v) ? v : null;
+export const str = <V>(v: V & Given<string, V>): string => (typeof v === 'string' ? v : '');
+export const count = <V>(v: V & Given<number, V>): number => num<unknown>(v) ?? 0;
+export const word = <T extends string>(v: string | null | undefined, words: readonly T[], otherwise: T): T =>
+  words.includes(v as T) ? (v as T) : otherwise;
+/// A list, empty where there is none: its elements as the contract has them, which Array.isArray would forget.
+export const elements = <E>(v: readonly E[] | null | undefined): readonly E[] =>
+  Array.isArray(v) ? (v as readonly E[]) : [];
+export const objects = <E>(v: readonly E[] | null | undefined): Extract<E, object>[] =>
+  elements(v).flatMap((e) => (obj(e) ? [e as Extract<E, object>] : []));
+export const texts = (v: Said<readonly string[]>): string[] =>
+  elements(v).filter((s): s is string => typeof s === 'string');
+
+export const fix_class = (v: string | null | undefined): FixClass => word(v, FIX, 'none');
+type Numbers = readonly (number | null | undefined)[];
+export function vec3<V>(v: V & Given<Numbers, V>): Vec3 | null {
   if (!Array.isArray(v) || v.length !== 3) return null;
-  const [a, b, c] = v.map(num);
+  const [a, b, c] = v.map(num<unknown>);
   return a == null || b == null || c == null ? null : [a, b, c];
 }
-export function cov6(v: unknown): readonly number[] | null {
-  return Array.isArray(v) && v.length === 6 && v.every((x) => num(x) !== null) ? (v as number[]) : null;
+export function cov6(v: Numbers | null | undefined): readonly number[] | null {
+  return Array.isArray(v) && v.length === 6 && v.every((x) => num<unknown>(x) !== null) ? (v as number[]) : null;
 }
-export function ellipse(v: unknown): Ellipse95 | null {
+export function ellipse(v: Said<Ellipse95>): Ellipse95 | null {
   const o = obj(v);
   const [major_m, minor_m, azimuth_deg] = [num(o?.major_m), num(o?.minor_m), num(o?.azimuth_deg)];
   return major_m == null || minor_m == null || azimuth_deg == null ? null : { major_m, minor_m, azimuth_deg };
 }
-const place = (o: Obj): Place => ({ lon: num(o.lon), lat: num(o.lat), h_m: num(o.h_m) });
-const FIX = ['none', 'single', 'dgps', 'float', 'fixed'] as const;
-export const STATUS = ['found', 'estimating', 'converged', 'ambiguous', 'accepted', 'moved'] as const;
-export const VERDICT = ['ok', 'weak_geometry', 'ambiguous', 'too_few', 'diverged'] as const;
+/// All words of an enum of the contract: one that is missing here does not compile.
+export const words_of =
+  <T extends string>() =>
+  <const W extends readonly T[]>(...all: Exclude<T, W[number]> extends never ? W : never): W =>
+    all;
+const FIX = words_of<FixClass>()('none', 'single', 'dgps', 'float', 'fixed');
+export const STATUS = words_of<Estimate['status'] | 'accepted' | 'moved'>()(
+  'found',
+  'estimating',
+  'converged',
+  'ambiguous',
+  'accepted',
+  'moved',
+);
+export const VERDICT = words_of<Verdict>()('ok', 'weak_geometry', 'ambiguous', 'too_few', 'diverged');
+const MISSION_STATE = words_of<State['state']>()('planned', 'recording', 'finished'),
+  FRAME = words_of<State['frame']>()('wgs84', 'local'),
+  DEVICE_STATE = words_of<DeviceMsg['state']>()('live', 'late', 'lost'),
+  LEVEL = words_of<EventMsg['level']>()('info', 'warning', 'critical'),
+  PRIORITY = words_of<AlarmMsg['priority']>()('critical', 'warning', 'advisory');
+
+/// What came as a message of the topic; null where it is no object.
+export const said = <T>(v: unknown): Extract<Said<T>, object> | null => obj(v) as Extract<Said<T>, object> | null;
+const place = (o: Exclude<Said<Place>, null | undefined>): Place => ({
+  lon: num(o.lon),
+  lat: num(o.lat),
+  h_m: num(o.h_m),
+});
 
 export function pose(v: unknown): Pose | null {
-  const o = obj(v);
+  const o = said<Topic<'drone.pose'>>(v);
   const t_us = num(o?.t_us);
   if (!o || t_us == null) return null;
   return {
@@ -191,7 +150,7 @@ export function pose(v: unknown): Pose | null {
   };
 }
 export function rtk(v: unknown): Rtk | null {
-  const o = obj(v);
+  const o = said<Topic<'rtk.status'>>(v);
   const t_us = num(o?.t_us);
   if (!o || t_us == null) return null;
   return {
@@ -204,7 +163,7 @@ export function rtk(v: unknown): Rtk | null {
   };
 }
 export function range(v: unknown): RangeMsg | null {
-  const o = obj(v);
+  const o = said<Topic<'ranges'>>(v);
   const [t_us, distance_m] = [num(o?.t_us), num(o?.distance_m)];
   if (!o || t_us == null || distance_m == null || !str(o.anchor)) return null;
   return {
@@ -221,18 +180,18 @@ export function range(v: unknown): RangeMsg | null {
     refused: str(o.refused) || null,
   };
 }
-export function mirror(v: unknown): Mirror | null {
+export function mirror(v: Said<Estimate['mirror']>): Mirror | null {
   const o = obj(v);
   return o && { ...place(o), enu_m: vec3(o.enu_m), probability: num(o.probability) };
 }
-export const gates = (v: unknown): GateMsg[] =>
-  (Array.isArray(v) ? v.map(obj) : []).flatMap((o) =>
-    o && str(o.name)
+export const gates = (v: Said<readonly GateMsg[]>): GateMsg[] =>
+  objects(v).flatMap((o) =>
+    str(o.name)
       ? [{ name: str(o.name), value: num(o.value), limit: num(o.limit), passed: o.passed === true, why: str(o.why) }]
       : [],
   );
 export function estimate(v: unknown): EstimateMsg | null {
-  const o = obj(v);
+  const o = said<Topic<'anchors.estimates'>>(v);
   if (!o || !str(o.anchor)) return null;
   return {
     mission: str(o.mission),
@@ -258,17 +217,17 @@ export function estimate(v: unknown): EstimateMsg | null {
   };
 }
 export function mission(v: unknown): MissionMsg | null {
-  const o = obj(v);
+  const o = said<Topic<'mission.state'>>(v);
   if (!o || !str(o.mission)) return null;
   const g = obj(o.origin);
   const [lon, lat, h_m] = [num(g?.lon), num(g?.lat), num(g?.h_m)];
   return {
     mission: str(o.mission),
     name: str(o.name),
-    state: word(o.state, ['planned', 'recording', 'finished'] as const, 'recording'),
+    state: word(o.state, MISSION_STATE, 'recording'),
     t_us: count(o.t_us),
     started_us: num(o.started_us),
-    frame: word(o.frame, ['wgs84', 'local'] as const, 'wgs84'),
+    frame: word(o.frame, FRAME, 'wgs84'),
     origin: lon == null || lat == null || h_m == null ? null : { lon, lat, h_m },
     n_ranges: count(o.n_ranges),
     n_fixes: count(o.n_fixes),
@@ -281,19 +240,19 @@ export function mission(v: unknown): MissionMsg | null {
   };
 }
 export function device(v: unknown): DeviceMsg | null {
-  const o = obj(v);
+  const o = said<Topic<'devices'>>(v);
   return o && str(o.network_id)
     ? {
         network_id: str(o.network_id),
         kind: str(o.kind),
-        state: word(o.state, ['live', 'late', 'lost'] as const, 'lost'),
+        state: word(o.state, DEVICE_STATE, 'lost'),
         last_seen_us: num(o.last_seen_us),
         rate_hz: num(o.rate_hz),
       }
     : null;
 }
 export function system(v: unknown): SystemMsg | null {
-  const o = obj(v);
+  const o = said<Topic<'system'>>(v);
   return (
     o && {
       t_us: count(o.t_us),
@@ -307,12 +266,12 @@ export function system(v: unknown): SystemMsg | null {
   );
 }
 export function event(v: unknown): EventMsg | null {
-  const o = obj(v);
+  const o = said<Topic<'events'>>(v);
   return (
     o && {
       id: str(o.id),
       t_us: count(o.t_us),
-      level: word(o.level, ['info', 'warning', 'critical'] as const, 'info'),
+      level: word(o.level, LEVEL, 'info'),
       code: str(o.code),
       text: str(o.text),
       mission: str(o.mission) || null,
@@ -320,11 +279,11 @@ export function event(v: unknown): EventMsg | null {
   );
 }
 export function alarm(v: unknown): AlarmMsg | null {
-  const o = obj(v);
+  const o = said<Topic<'alarms'>>(v);
   return o && str(o.id)
     ? {
         id: str(o.id),
-        priority: word(o.priority, ['critical', 'warning', 'advisory'] as const, 'warning'),
+        priority: word(o.priority, PRIORITY, 'warning'),
         since_us: count(o.since_us),
         text: str(o.text),
         acknowledged: o.acknowledged === true,
@@ -332,7 +291,7 @@ export function alarm(v: unknown): AlarmMsg | null {
     : null;
 }
 export function revision(v: unknown): RevisionMsg | null {
-  const o = obj(v);
+  const o = said<Topic<'revisions'>>(v);
   const n = num(o?.revision);
   return o && n != null ? { revision: n, t_us: count(o.t_us), calibration: str(o.calibration) } : null;
 }

@@ -1,5 +1,5 @@
 /// The plan of a floor in squares, where the map is nearer than its backdrop is sharp: which are in sight, and their pictures, asked for as they are.
-import { api_url } from '../api/client';
+import { bytes } from '../api/contract';
 import { backdrop_version, type Backdrop, type Floor } from '../state/floors';
 import { to_px, type Camera } from './camera';
 
@@ -57,6 +57,11 @@ export function cells_in_sight(
   return cells;
 }
 
+/// Where the server has a tile.
+interface Place extends Pick<Cell, 'column' | 'row'> {
+  readonly id: string;
+  readonly level: number;
+}
 /// Null: nothing of the plan lies there.
 type Picture = ImageBitmap | null;
 const MOST_KEPT = 300, // 256 kB each
@@ -66,7 +71,7 @@ const MOST_KEPT = 300, // 256 kB each
   DRAWN_EVERY_MS = 100;
 const kept = new Map<string, Picture>(), ///< the one used last is the last
   under_way = new Set<string>(),
-  wanted = new Map<string, readonly (readonly [key: string, path: string])[]>(); ///< of a floor, as it was drawn last
+  wanted = new Map<string, readonly (readonly [key: string, path: Place])[]>(); ///< of a floor, as it was drawn last
 let timer = 0,
   drawing = 0;
 
@@ -101,7 +106,7 @@ function ask(): void {
   if (next && under_way.size < AT_ONCE) {
     const [key, path] = next;
     under_way.add(key);
-    fetch(api_url(path), { credentials: 'same-origin', cache: 'no-cache' })
+    bytes('/floors/{id}/plan/tiles/{level}/{column}/{row}', { path })
       .then(async (r) => {
         if (!r.ok) throw new Error(String(r.status));
         keep(key, r.status === 204 ? null : await createImageBitmap(await r.blob()));
@@ -136,7 +141,7 @@ export function draw_tiles(c: CanvasRenderingContext2D, cam: Camera, b: Backdrop
       .sort((x, y) => middle(x) - middle(y))
       .map(({ column, row }) => [
         key_of(floor, level.level, column, row),
-        `/floors/${floor.id}/plan/tiles/${level.level}/${column}/${row}`,
+        { id: floor.id, level: level.level, column, row },
       ]),
   );
   for (const cell of cells) draw_cell(c, b, level, cell);

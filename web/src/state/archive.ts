@@ -1,7 +1,19 @@
 /// What the stream does not tell: flights of an earlier life of the server, from REST. The stream wins wherever both speak.
 import { effect } from '@preact/signals';
-import { request } from '../api/client';
-import { fix_class, mission, num, obj, str, vec3, type MissionMsg } from '../live/messages';
+import { get, list, type Wire } from '../api/contract';
+import {
+  elements,
+  fix_class,
+  mission,
+  num,
+  obj,
+  objects,
+  str,
+  vec3,
+  type MissionMsg,
+  type Said,
+} from '../live/messages';
+import type { Topic } from '../live/stream';
 import { enu_from_geodetic } from '../map/enu';
 import type { TrailPoint } from './scene';
 import {
@@ -17,11 +29,11 @@ import {
   when_back,
 } from './store';
 
-const micros = (rfc3339: unknown): number | null => {
+const micros = (rfc3339: string | null | undefined): number | null => {
   const ms = Date.parse(str(rfc3339));
   return Number.isNaN(ms) ? null : ms * 1000;
 };
-export function mission_of_rest(v: unknown): MissionMsg | null {
+export function mission_of_rest(v: Said<Wire<'Mission'>>): MissionMsg | null {
   const o = obj(v),
     created_us = micros(o?.created_at);
   return (
@@ -35,14 +47,14 @@ export function mission_of_rest(v: unknown): MissionMsg | null {
       started_us: created_us,
       n_ranges: num(o.n_ranges),
       n_fixes: num(o.n_fixes),
-    })
+    } satisfies Said<Topic<'mission.state'>>)
   );
 }
 export async function load_missions(): Promise<void> {
   try {
-    const items = obj(await request('GET', '/missions?limit=100'))?.items;
+    const items = await list('/missions', { query: { limit: 100 } });
     const known = new Set(mission_list.value.map((m) => m.mission));
-    const news = (Array.isArray(items) ? items : [])
+    const news = objects(items)
       .map(mission_of_rest)
       .filter((m) => m !== null)
       .filter((m) => !known.has(m.mission));
@@ -56,11 +68,8 @@ export async function load_missions(): Promise<void> {
 /// Estimates of a flight nobody feeds any more: asked for once, when it is looked at and the stream gave none.
 async function load_estimates(id: string): Promise<void> {
   try {
-    const [{ rows_of_collection }, answer] = await Promise.all([
-        import('../api/anchors'),
-        request('GET', `/anchors?view=live&mission=${encodeURIComponent(id)}&limit=1000`),
-      ]),
-      { rows } = rows_of_collection(answer);
+    const { live_rows } = await import('../api/anchors'),
+      rows = await live_rows(id);
     const scene = scene_of(id);
     for (const r of rows)
       if (!scene.anchors.has(r.anchor))
@@ -73,9 +82,10 @@ async function load_estimates(id: string): Promise<void> {
 /// The way flown before this page was opened: a reload in the field must not wipe the map. What the stream has told meanwhile stays.
 async function load_track(m: MissionMsg): Promise<void> {
   try {
-    const feature = obj(
-      await request('GET', `/missions/${encodeURIComponent(m.mission)}/track?limit=10000&since=${TRACK_SINCE(m)}`),
-    );
+    const feature = await get('/missions/{id}/track', {
+      path: { id: m.mission },
+      query: { limit: 10_000, since: TRACK_SINCE(m) },
+    });
     const scene = scene_of(m.mission),
       news = trail_of(feature, m.origin).filter((p) => !scene.trail[0] || p.t_us < scene.trail[0].t_us);
     scene.add_earlier_trail(news);
@@ -86,15 +96,14 @@ async function load_track(m: MissionMsg): Promise<void> {
 }
 const TRACK_SINCE = (m: MissionMsg): string => new Date(Math.max(0, m.t_us / 1000 - 480_000)).toISOString(); ///< eight minutes: one page even at 20 Hz
 /// GeoJSON of a track as points about the origin of the flight; none where a track on the globe has no origin yet.
-export function trail_of(feature: Record<string, unknown> | null, origin: MissionMsg['origin']): TrailPoint[] {
+export function trail_of(feature: Said<Wire<'Track'>>, origin: MissionMsg['origin']): TrailPoint[] {
   const p = obj(feature?.properties),
-    times = Array.isArray(p?.t_us) ? p.t_us : [],
-    fixes = Array.isArray(p?.fix) ? p.fix : [],
-    globe = obj(feature?.geometry)?.coordinates;
+    times = elements(p?.t_us),
+    fixes = elements(p?.fix);
   const places = Array.isArray(p?.local_m)
-    ? p.local_m.map(vec3)
-    : Array.isArray(globe) && origin
-      ? globe.map((c) => {
+    ? elements(p?.local_m).map((c) => vec3(c))
+    : origin
+      ? elements(obj(feature?.geometry)?.coordinates).map((c) => {
           const v = vec3(c);
           return v && enu_from_geodetic({ lon: v[0], lat: v[1], h_m: v[2] }, origin);
         })

@@ -1,7 +1,6 @@
 /// The plans of floors under the maps: which there are, which level is shown, and their pictures. Asked for once, when a map is first shown.
 import { signal } from '@preact/signals';
-import { api_url } from '../api/client';
-import { list, type Wire } from '../api/contract';
+import { bytes, list, type Wire } from '../api/contract';
 import { enu_from_geodetic, geodetic_from_enu, type Geodetic } from '../map/enu';
 
 export type Floor = Wire<'Floor'>;
@@ -69,7 +68,7 @@ function picture(floor: Floor): HTMLImageElement | null {
   if (known) return known.complete && known.naturalWidth ? known : null;
   const image = new Image();
   pictures.set(sha, image);
-  fetch(api_url(`/floors/${floor.id}/plan/backdrop`), { credentials: 'same-origin', cache: 'no-cache' })
+  bytes('/floors/{id}/plan/backdrop', { path: { id: floor.id } })
     .then((r) => (r.ok ? r.blob() : Promise.reject(new Error(String(r.status)))))
     .then((blob) => {
       image.onload = () => backdrop_version.value++;

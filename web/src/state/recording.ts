@@ -1,18 +1,23 @@
 /// A stored flight, and the player that feeds a scene from it as the stream would have. No DOM.
-import { request } from '../api/client';
+import { get, list, type Wire } from '../api/contract';
 import {
   all,
+  count,
+  elements,
   estimate,
   fix_class,
   num,
   obj,
   str,
+  objects,
   vec3,
   type EstimateMsg,
   type MissionMsg,
   type Pose,
   type RangeMsg,
+  type Said,
 } from '../live/messages';
+import type { Topic } from '../live/stream';
 import { enu_from_geodetic, type Geodetic } from '../map/enu';
 import { Scene } from './scene';
 
@@ -35,18 +40,21 @@ export interface Recording {
 const PAGE = 10_000,
   PAGES_MAX = 12; ///< 120 000 rows of each: three hours at 10 Hz; more is said to be cut
 
-async function pages<T>(
-  path: string,
-  of: (o: Record<string, unknown>) => T | null,
+interface Page<Row> {
+  readonly items?: readonly Said<Row>[] | null;
+  readonly next_cursor?: string | null;
+}
+async function pages<Row, T>(
+  page: (query: { mission: string; limit: number; cursor?: string }) => Promise<Page<Row> | null>,
+  mission: string,
+  of: (row: Said<Row>) => T | null,
 ): Promise<{ rows: T[]; cut: boolean }> {
   const rows: T[] = [];
   let cursor = '';
   for (let i = 0; i < PAGES_MAX; i++) {
-    const answer = obj(
-      await request('GET', `${path}&limit=${PAGE}${cursor && `&cursor=${encodeURIComponent(cursor)}`}`),
-    );
-    for (const o of (Array.isArray(answer?.items) ? answer.items : []).map(obj)) {
-      const row = o && of(o);
+    const answer = await page({ mission, limit: PAGE, ...(cursor ? { cursor } : {}) });
+    for (const o of elements(answer?.items)) {
+      const row = of(o);
       if (row) rows.push(row);
     }
     cursor = str(answer?.next_cursor);
@@ -56,25 +64,24 @@ async function pages<T>(
 }
 
 /// The first place on the globe is the origin of a flight whose own is not known any more.
-export function poses_of(rows: readonly Record<string, unknown>[], mission: string, origin: Geodetic | null): Pose[] {
+export function poses_of(rows: readonly Said<Wire<'Fix'>>[], mission: string, origin: Geodetic | null): Pose[] {
   let zero = origin;
-  return rows.flatMap((o) => {
+  return objects(rows).flatMap((o) => {
     const t_us = num(o.t_us),
       [lon, lat, h_m] = [num(o.lon), num(o.lat), num(o.h_m)],
       local = vec3(o.local_m),
-      c = Array.isArray(o.cov_enu_m2) ? o.cov_enu_m2.map(num) : [];
+      c = elements(o.cov_enu_m2).map((v) => num(v));
     if (t_us === null) return [];
     const here = lon !== null && lat !== null ? { lon, lat, h_m: h_m ?? 0 } : null;
     zero ??= here;
     const sigma = (v: number | null | undefined): number => Math.sqrt(Math.max(0, v ?? 0)),
-      q = Array.isArray(o.q) ? o.q.map(num) : [],
+      q = elements(o.q).map((v) => num(v)),
       [x, y, z, w] = q;
     // Body x-axis of the quaternion in ENU: its bearing is the heading.
     const heading_deg =
-      num(o.heading_deg) ??
-      (x != null && y != null && z != null && w != null
+      x != null && y != null && z != null && w != null
         ? (Math.atan2(1 - 2 * (y * y + z * z), 2 * (x * y + w * z)) * 180) / Math.PI
-        : null);
+        : null;
     return [
       {
         mission,
@@ -95,11 +102,12 @@ export function poses_of(rows: readonly Record<string, unknown>[], mission: stri
 /// Class and correction are what the promoted models make of it now; without one it is as measured.
 export const range_of =
   (mission: string) =>
-  (o: Record<string, unknown>): RangeMsg | null => {
-    const t_us = num(o.t_us),
-      distance_m = num(o.distance_m),
-      predicted = obj(o.predicted);
-    return t_us === null || distance_m === null
+  (row: Said<Wire<'Range'>>): RangeMsg | null => {
+    const o = obj(row),
+      t_us = num(o?.t_us),
+      distance_m = num(o?.distance_m),
+      predicted = obj(o?.predicted);
+    return !o || t_us === null || distance_m === null
       ? null
       : {
           t_us,
@@ -117,28 +125,22 @@ export const range_of =
   };
 
 /// Events within the recording, in the order of the flight: the server gives the newest first.
-export const marks_of = (
-  events: readonly (Record<string, unknown> | null)[],
-  from_us: number,
-  to_us: number,
-): Recording['marks'] =>
-  events
-    .flatMap((e) => (e ? [{ t_us: num(e.t_us) ?? 0, level: str(e.level), code: str(e.code), text: str(e.text) }] : []))
+export const marks_of = (events: readonly Said<Wire<'Event'>>[], from_us: number, to_us: number): Recording['marks'] =>
+  objects(events)
+    .map((e) => ({ t_us: count(e.t_us), level: str(e.level), code: str(e.code), text: str(e.text) }))
     .filter((e) => e.t_us >= from_us && e.t_us <= to_us)
     .sort((a, b) => a.t_us - b.t_us);
 
 export async function load_recording(mission: MissionMsg): Promise<Recording> {
-  const of = encodeURIComponent(mission.mission);
+  const of = mission.mission;
   const [fixes, ranges, events] = await Promise.all([
-    pages(`/fixes?mission=${of}`, (o) => o),
-    pages(`/ranges?mission=${of}&predicted=true`, range_of(mission.mission)),
-    request('GET', `/missions/${of}/events?limit=1000`).then(
-      (a) => {
-        const items = obj(a)?.items;
-        return Array.isArray(items) ? items.map(obj) : [];
-      },
-      () => [],
+    pages(
+      (query) => get('/fixes', { query }),
+      of,
+      (row) => row,
     ),
+    pages((query) => get('/ranges', { query: { ...query, predicted: true } }), of, range_of(of)),
+    list('/missions/{id}/events', { path: { id: of }, query: { limit: 1000 } }).catch(() => []),
   ]);
   const poses = poses_of(fixes.rows, mission.mission, mission.origin),
     by_time = (a: { t_us: number }, b: { t_us: number }): number => a.t_us - b.t_us;
@@ -161,8 +163,11 @@ export async function load_recording(mission: MissionMsg): Promise<Recording> {
 
 /// What was estimated when, in the order of time: the server computes it from the stored rows, which takes seconds for a long flight.
 export async function estimates_over_time(mission: string): Promise<EstimateMsg[]> {
-  const answer = obj(await request('GET', `/missions/${encodeURIComponent(mission)}/estimates`));
-  return all(answer?.items ?? [], estimate).sort((a, b) => a.t_us - b.t_us);
+  // As the stream would have said them.
+  const items: readonly Topic<'anchors.estimates'>[] = await list('/missions/{id}/estimates', {
+    path: { id: mission },
+  });
+  return all(items ?? [], estimate).sort((a, b) => a.t_us - b.t_us);
 }
 
 /// First index whose time is above t.

@@ -1,6 +1,7 @@
 import { computed, signal } from '@preact/signals';
-import { ApiError, request } from '../api/client';
-import { obj, str } from '../live/messages';
+import { ApiError } from '../api/client';
+import { call, get, type Wire } from '../api/contract';
+import { obj, str, texts, type Said } from '../live/messages';
 
 export interface Me {
   readonly name: string;
@@ -14,12 +15,12 @@ export const may = (...roles: string[]): boolean =>
   !!me.value && (me.value.auth === 'off' || me.value.roles.some((r) => r === 'admin' || roles.includes(r)));
 export const may_publish = computed(() => may('engineer', 'operator', 'op'));
 
-function me_of(answer: unknown): Me | null {
+function me_of(answer: Said<Wire<'Me'>>): Me | null {
   const o = obj(answer);
   return (
     o && {
       name: str(o.name),
-      roles: Array.isArray(o.roles) ? o.roles.filter((r): r is string => typeof r === 'string') : [],
+      roles: texts(o.roles),
       auth: str(o.auth) || (str(o.token_id) === 'local' ? 'off' : 'on'),
     }
   );
@@ -27,16 +28,16 @@ function me_of(answer: unknown): Me | null {
 /// Asks who we are; signed out on 401. Other trouble leaves what is known: a lost link is not a lost session.
 export async function refresh_me(): Promise<void> {
   try {
-    me.value = me_of(await request('GET', '/me'));
+    me.value = me_of(await get('/me'));
   } catch (e) {
     if (e instanceof ApiError && (e.problem.status === 401 || e.problem.status === 403)) me.value = null;
   }
 }
 export async function sign_in(token: string): Promise<void> {
-  await request('POST', '/session', { token });
+  await call('post', '/session', { body: { token } });
   await refresh_me();
 }
 export async function sign_out(): Promise<void> {
-  await request('DELETE', '/session');
+  await call('delete', '/session');
   me.value = null;
 }

@@ -4,6 +4,7 @@ import * as f from '../live/flight_messages';
 import * as m from '../live/messages';
 import { age } from '../ui/format';
 import type { LinkState, LiveSink, LiveSource } from '../live/source';
+import type { TopicName } from '../live/stream';
 import { Scene } from './scene';
 
 export const TOPICS = [
@@ -22,7 +23,7 @@ export const TOPICS = [
   'mission.grid',
   'mission.turn',
   'mission.height',
-] as const;
+] as const satisfies readonly TopicName[];
 
 /// A link that cannot keep up gets less, and nothing older.
 export const PARAMS = {
@@ -128,7 +129,7 @@ function upsert(list: readonly m.MissionMsg[], news: readonly m.MissionMsg[]): m
 }
 
 type Handler = (data: unknown, whole: boolean) => void;
-const handlers: Record<string, Handler> = {
+const handlers: Record<(typeof TOPICS)[number], Handler> & Partial<Record<TopicName, Handler>> = {
   'mission.state': (data) => {
     const news = m.all(data, m.mission);
     mission_list.value = upsert(mission_list.value, news);
@@ -188,7 +189,7 @@ let lost_ms: number | null = null; ///< when the last thing arrived before the o
 /// What an outage was, and what came back after it.
 export function back_words(
   outage_ms: number | null,
-  recovered: ReadonlyMap<string, number>,
+  recovered: ReadonlyMap<TopicName, number>,
   resynchronised: boolean,
 ): string {
   const back = outage_ms === null ? 'Connected again' : `Link back after ${age(outage_ms)}`;
@@ -196,7 +197,7 @@ export function back_words(
   const what = [...recovered].map(([topic, n]) => `${n} of ${TOPIC_WORDS[topic] ?? topic.replaceAll('.', ' ')}`);
   return what.length ? `${back}, recovered messages: ${what.join(', ')}` : `${back}. Nothing was missed`;
 }
-const TOPIC_WORDS: Record<string, string> = {
+const TOPIC_WORDS: Partial<Record<TopicName, string>> = {
   'mission.state': 'flights',
   'drone.pose': 'positions',
   'rtk.status': 'RTK',

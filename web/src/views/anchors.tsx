@@ -1,8 +1,8 @@
 /// Anchors: table and map linked, live estimates or the published revision, and the detail of the selected one.
 import { effect, signal } from '@preact/signals';
 import { useEffect, useMemo, useRef } from 'preact/hooks';
-import { api_url, ApiError } from '../api/client';
-import { published, row_of_estimate, type AnchorRow } from '../api/anchors';
+import { ApiError } from '../api/client';
+import { anchors_url, published, row_of_estimate, type AnchorRow } from '../api/anchors';
 import { enu_from_geodetic, type Geodetic } from '../map/enu';
 import type { FlightPicture } from '../map/flight_layer';
 import { MapBox } from '../map/map_box';
@@ -142,7 +142,7 @@ export function Anchors({ anchor }: { anchor: string | null }) {
     looking = linked !== null && !found && !wanted;
   const search = useRef<HTMLInputElement>(null);
   const ready = done_count(live ? scene : null, live ? mission : null);
-  const query = live ? `?view=live${mission ? `&mission=${encodeURIComponent(mission.mission)}` : ''}&` : '?';
+  const of = mission?.mission ?? null;
   const estimates = live ? scene?.estimates_version : loaded.value,
     marked = selected?.anchor;
   const version = useMemo(() => ({ live, estimates, wanted, marked }), [live, estimates, wanted, marked]);
@@ -196,16 +196,11 @@ export function Anchors({ anchor }: { anchor: string | null }) {
         >
           Compare
         </button>
-        <a class="btn" href={api_url(`/anchors${query}format=csv`)} download="anchors.csv" data-testid="csv">
+        <a class="btn" href={anchors_url('csv', live, of)} download="anchors.csv" data-testid="csv">
           <Icon name="download" />
           CSV
         </a>
-        <a
-          class="btn"
-          href={api_url(`/anchors${query}format=geojson`)}
-          download="anchors.geojson"
-          data-testid="geojson"
-        >
+        <a class="btn" href={anchors_url('geojson', live, of)} download="anchors.geojson" data-testid="geojson">
           <Icon name="download" />
           GeoJSON
         </a>

@@ -1,5 +1,7 @@
 /// One place of a campaign, taken in the field: its truth, the rows that are sent, and what they are like so far. No DOM.
-import { num } from '../../live/messages';
+import type { TruthOfRows } from '../../api/campaign';
+import type { Wire } from '../../api/contract';
+import { num, objects, type Said } from '../../live/messages';
 
 export interface Place {
   readonly campaign: string;
@@ -72,24 +74,24 @@ export function setting_of(p: Place): string {
   ].join(', ');
 }
 /// The truth of every row, as the import takes it beside the rows.
-export function truth_query(p: Place): URLSearchParams {
-  const out = new URLSearchParams();
+export function truth_query(p: Place): TruthOfRows {
+  const out: TruthOfRows = {};
   for (const [name, text] of [
     ['environment', p.environment],
     ['setting', setting_of(p)],
     ['material', p.material],
   ] as const)
-    if (text.trim()) out.set(name, text.trim());
+    if (text.trim()) out[name] = text.trim();
   for (const name of ['distance_m', 'heading_deg', 'height_difference_m', 'thickness_m'] as const) {
     const v = typed_number(p[name]);
-    if (v != null) out.set(name, String(v));
+    if (v != null) out[name] = v;
   }
-  if (p.los) out.set('los', String(p.los === 'los'));
+  if (p.los) out.los = p.los === 'los';
   return out;
 }
 /// Stored ranges as lines of the import, with everything the radio told.
-export function lines_of(ranges: readonly Readonly<Record<string, unknown>>[]): string {
-  return ranges
+export function lines_of(ranges: readonly Said<Wire<'Range'>>[]): string {
+  return objects(ranges)
     .map((r) => {
       const t_us = num(r.t_us),
         line: Record<string, unknown> = {

@@ -1,6 +1,6 @@
 /// The plan being edited, in metres about its own origin for the map, and every change as a new draft, so that undo is a list. No DOM.
 import type { Corner, Plan, Waypoint } from '../../api/plans';
-import { num, obj, str } from '../../live/messages';
+import { num, obj } from '../../live/messages';
 import { enu_from_geodetic, geodetic_from_enu, type Geodetic } from '../../map/enu';
 
 export type Shape = 'outline' | 'fence' | 'waypoints' | `no_fly/${number}`;
@@ -107,7 +107,8 @@ export function plan_from_draft(kept: unknown): Plan | null {
   const o = obj(kept);
   if (
     !o ||
-    (o.id !== null && !str(o.id)) ||
+    (o.id !== null && typeof o.id !== 'string') ||
+    o.id === '' ||
     typeof o.name !== 'string' ||
     num(o.revision) === null ||
     num(o.building_height_m) === null ||

@@ -1,6 +1,6 @@
 /// The plan of a floor: sent, placed by three or more clicked points, traced, and its outline taken over.
 import { useEffect, useState } from 'preact/hooks';
-import { api_url, error_text } from '../../api/client';
+import { error_text } from '../../api/client';
 import {
   accept_trace,
   create_floor,
@@ -8,6 +8,7 @@ import {
   floors as fetch_floors,
   georeference,
   MATERIALS,
+  preview_url,
   send_plan,
   trace as fetch_trace,
   type Click,
@@ -260,7 +261,7 @@ function Placed({
       </p>
       <div class="clickplan">
         <img
-          src={api_url(`/floors/${held.floor.id}/plan/preview`)}
+          src={preview_url(held.floor.id)}
           alt={`Plan of ${held.floor.name}`}
           data-testid="plan-picture"
           onClick={(e) => {

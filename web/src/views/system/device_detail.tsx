@@ -202,7 +202,7 @@ function Anchors({ d, radios, may_ask, run }: { d: Device; radios: readonly Devi
     void run(
       'look',
       async () => {
-        const list = obj(obj(await act_on_device(d.id!, 'discover'))?.result)?.devices;
+        const list = obj(await act_on_device(d.id!, 'discover'))?.devices;
         set_seen((Array.isArray(list) ? list : []).map(str).filter(Boolean).sort());
       },
       '',
