@@ -43,7 +43,7 @@ struct LinkHandlers {
   /// line.
   std::function<void(const Error& why)> on_closed{};
   /// UDP, tcp-listen: whether these bytes count, and their sender is who we answer from now on. Absent: the
-  /// latest sender, or connection, is. What is not welcome never reaches on_bytes.
+  /// latest sender is. What is not welcome never reaches on_bytes.
   std::function<bool(std::string_view bytes, const std::string& sender, const Arrival& at)> welcome{};
 };
 

@@ -117,9 +117,10 @@ class TcpLink : public ByteLink {
   std::shared_ptr<State> state_;
 };
 
-/// Waits for the device to come. One peer at a time, and the newest wins: a rover that rebooted is back
-/// before its old connection is known to be dead. Where the handlers say who is welcome, nobody wins by
-/// connecting: each connection is a guest until bytes of it were welcome.
+/// Waits for the device to come. One peer at a time, and the newest whose bytes came wins: a rover that
+/// rebooted is back before its old connection is known to be dead, and who only connects (a port scan) takes
+/// nobody's place. While there is no peer, the first to connect is it, unless the handlers say who is
+/// welcome.
 class ListenLink final : public ByteLink {
  public:
   ListenLink(asio::io_context& io, Address address, const LinkOptions& options)
@@ -151,7 +152,7 @@ class ListenLink final : public ByteLink {
     for (const auto& guest : std::exchange(state_->guests, {})) guest.pump->stop();
   }
   bool is_open() const override { return state_->shared->open; }
-  LinkCounters counters() const override { return state_->shared->counters; }
+  LinkCounters counters() const override { return state_->counters(); }
   std::uint16_t port() const override { return state_->address.port; }
 
  private:
@@ -196,27 +197,9 @@ class ListenLink final : public ByteLink {
       });
     }
 
+    /// Its bytes go to whoever judges them first, and to the handlers only when they were welcome.
     void take(tcp::socket socket) {
       keep_alive(socket);
-      if (shared->handlers.welcome) return receive_guest(std::move(socket));
-      if (const auto old = std::exchange(peer, nullptr)) old->stop();
-      peer = std::make_shared<TcpPump>(std::move(socket), shared,
-                                       [weak = weak_from_this()](const ErrorCode&, bool) {
-                                         if (const auto self = weak.lock()) self->peer_went();
-                                       });
-      const auto now = peer;
-      shared->opened();
-      if (!shared->closed) now->start();
-    }
-
-    /// The next one may come; silence is the supervisor's business.
-    void peer_went() {
-      peer = nullptr;
-      shared->open = false;
-    }
-
-    /// Its bytes go to whoever judges them first, and to the handlers only when they were welcome.
-    void receive_guest(tcp::socket socket) {
       ErrorCode gone;
       const auto from = socket.remote_endpoint(gone);
       if (gone) return;
@@ -234,36 +217,65 @@ class ListenLink final : public ByteLink {
         if (const auto self = weak.lock()) self->judge(of, bytes, name, at);
       };
       guests.push_back({line, guest});
-      guest->start();
-      if (guests.size() <= k_guests) return;
-      const auto oldest = guests.front().pump == peer ? guests.begin() + 1 : guests.begin();
-      oldest->pump->stop();
-      guests.erase(oldest);
+      if (guests.size() > k_guests) {
+        const auto oldest = guests.front().pump == peer ? guests.begin() + 1 : guests.begin();
+        oldest->pump->stop();
+        dismiss(oldest);
+      }
+      serve_somebody();
+      if (!shared->closed) guest->start();
+    }
+
+    /// A device may wait to be asked before it says anything.
+    void serve_somebody() {
+      if (peer == nullptr && !guests.empty() && !shared->handlers.welcome) serve(guests.back().pump);
+    }
+
+    void serve(const std::shared_ptr<TcpPump>& guest) {
+      if (const auto old = std::exchange(peer, guest)) {
+        old->stop();
+        dismiss(std::ranges::find(guests, old, &Guest::pump));
+      }
+      shared->opened();
     }
 
     void judge(const Shared* of, std::string_view bytes, const std::string& name, const Arrival& at) {
       const auto found = guest_of(of);
-      if (shared->closed || found == guests.end() || !shared->handlers.welcome(bytes, name, at)) return;
-      if (found->pump != peer) {
-        if (const auto old = std::exchange(peer, found->pump)) {
-          old->stop();
-          std::erase_if(guests, [&](const Guest& one) { return one.pump == old; });
-        }
-        shared->opened();
-      }
+      if (shared->closed || found == guests.end()) return;
+      if (shared->handlers.welcome && !shared->handlers.welcome(bytes, name, at)) return;
+      if (found->pump != peer) serve(std::shared_ptr<TcpPump>(found->pump));
       if (!shared->closed) shared->took(bytes);
     }
 
+    /// The next one may come; silence is the supervisor's business.
     void left(const Shared* of) {
       const auto found = guest_of(of);
       if (found == guests.end()) return;
-      if (found->pump == peer) peer_went();
-      guests.erase(found);
+      if (found->pump == peer) {
+        peer = nullptr;
+        shared->open = false;
+      }
+      dismiss(found);
+      serve_somebody();
+    }
+
+    /// What it was sent stays counted.
+    void dismiss(std::vector<Guest>::iterator guest) {
+      add(shared->counters, guest->line->counters);
+      guests.erase(guest);
+    }
+    static void add(LinkCounters& to, const LinkCounters& of) {
+      to.bytes_out += of.bytes_out;
+      to.writes_refused += of.writes_refused;
+    }
+    LinkCounters counters() const {
+      LinkCounters all = shared->counters;
+      for (const auto& guest : guests) add(all, guest.line->counters);
+      return all;
     }
 
     std::vector<Guest>::iterator guest_of(const Shared* line) {
-      return std::find_if(guests.begin(), guests.end(),
-                          [&](const Guest& one) { return one.line.get() == line; });
+      return std::ranges::find_if(guests, [&](const Guest& one) { return one.line.get() == line; });
     }
 
     asio::io_context& io;
@@ -271,7 +283,7 @@ class ListenLink final : public ByteLink {
     tcp::acceptor acceptor;
     std::shared_ptr<Shared> shared;
     std::shared_ptr<TcpPump> peer;
-    std::vector<Guest> guests;  ///< and the peer, where handlers say who is welcome
+    std::vector<Guest> guests;  ///< the peer among them; the newest last
   };
 
   std::shared_ptr<State> state_;

@@ -70,12 +70,14 @@ TEST(TcpLink, GivesUpConnectingToAHostThatDoesNotAnswer) {
   EXPECT_EQ(client.opens, 0);
 }
 
-TEST(ListenLink, ServesTheNewestPeerAndLetsTheOldOneGo) {
+TEST(ListenLink, ServesTheNewestPeerWhoseBytesCameAndLetsTheOldOneGo) {
   boost::asio::io_context io;
   Seen server(made(io, "tcp-listen://:0"));
   Seen first(made(io, at_port("tcp://", server)));
-  ASSERT_TRUE(run_until(io, [&] { return server.opens == 1; }));
+  ASSERT_TRUE(run_until(io, [&] { return server.opens == 1; })) << "it may wait to be asked";
   Seen second(made(io, at_port("tcp://", server)));
+  ASSERT_TRUE(run_until(io, [&] { return second.opens == 1; }));
+  ASSERT_TRUE(second.link->write("here"));
   ASSERT_TRUE(run_until(io, [&] { return server.opens == 2 && first.why.has_value(); }));
   ASSERT_TRUE(server.link->write("hello"));
   ASSERT_TRUE(run_until(io, [&] { return second.text == "hello"; }));
@@ -84,6 +86,28 @@ TEST(ListenLink, ServesTheNewestPeerAndLetsTheOldOneGo) {
   EXPECT_FALSE(server.why) << "it goes on listening";
   Seen third(made(io, at_port("tcp://", server)));
   ASSERT_TRUE(run_until(io, [&] { return server.opens == 3; }));
+}
+
+/// As port scans do, and neighbours that mistake the address.
+TEST(ListenLink, KeepsADeviceThatSendsWhileOthersOnlyConnect) {
+  boost::asio::io_context io;
+  Seen server(made(io, "tcp-listen://:0"));
+  auto device = std::make_unique<Seen>(made(io, at_port("tcp://", server)));
+  ASSERT_TRUE(run_until(io, [&] { return server.opens == 1 && device->opens == 1; }));
+  std::vector<std::unique_ptr<Seen>> others;
+  for (int i = 0; i < 20; ++i) {
+    others.push_back(std::make_unique<Seen>(made(io, at_port("tcp://", server))));
+    ASSERT_TRUE(run_until(io, [&] { return others.back()->opens == 1; }));
+  }
+  ASSERT_TRUE(device->link->write("5 m"));
+  ASSERT_TRUE(run_until(io, [&] { return server.text == "5 m"; }));
+  EXPECT_EQ(server.opens, 1);
+  ASSERT_TRUE(server.link->write("next"));
+  ASSERT_TRUE(run_until(io, [&] { return device->text == "next"; }));
+  EXPECT_FALSE(device->why);
+  EXPECT_EQ(server.link->counters().bytes_out, 4U);
+  device->link->close();
+  ASSERT_TRUE(run_until(io, [&] { return server.opens == 2; })) << "one of those who wait is asked now";
 }
 
 /// Whoever can reach the port of an aircraft must not be able to cut it off by connecting.
