@@ -99,7 +99,7 @@ class DeviceLoop::Impl final : public PipelineSink, public std::enable_shared_fr
     poll_.cancel();
     for (auto& [slot, entry] : entries_) {
       entry.timer.cancel();
-      entry.link.reset();
+      drop_link(slot);
     }
   }
 
@@ -130,8 +130,9 @@ class DeviceLoop::Impl final : public PipelineSink, public std::enable_shared_fr
   Result<void> remove(const std::string& id) {
     const auto slot = slot_of(id);
     if (!slot) return make_error(Errc::not_found, "there is no such device");
-    entries_.erase(*slot);
+    // First: what its driver still held, such as the epoch of now, comes out while somebody hears it.
     (void)take({EventKind::removed, *slot, link::arrival_now(), {}});
+    entries_.erase(*slot);
     listener_.changed(id);
     return boost::outcome_v2::success();
   }

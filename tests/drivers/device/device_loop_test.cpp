@@ -140,6 +140,29 @@ TEST(DeviceLoop, PulledAndPluggedTwoHundredTimesLosesOnlyTheFrameThatWasCut) {
   fs::remove_all(folder);
 }
 
+/// A receiver's epoch is whole when the next one begins or the wire is quiet: the newest waits in its driver.
+TEST(DeviceLoop, LosesNoEpochWhenADeviceIsRemovedOrTheLoopEnds) {
+  for (const bool removed : {true, false}) {
+    boost::asio::io_context io;
+    Listener listener;
+    {
+      DeviceLoop loop(io, nullptr, listener, quick());
+      Cable cable(temporary("last"));
+      cable.plug();
+      ASSERT_TRUE(loop.add(gnss("r", "serial:" + cable.path)));
+      loop.record_into(k_mission);
+      ASSERT_TRUE(run_until(io, [&] { return loop.device("r")->phase == Phase::open; }));
+      const std::string text = epoch(1) + epoch(2);
+      cable.say(text);
+      ASSERT_TRUE(run_until(io, [&] { return loop.device("r")->bytes_in == text.size(); }));
+      if (removed) {
+        ASSERT_TRUE(loop.remove("r"));
+      }
+    }
+    EXPECT_EQ(listener.fixes.size(), 2U) << (removed ? "removed" : "the loop ended");
+  }
+}
+
 TEST(DeviceLoop, WhatItRecordsReplaysToTheSameFixes) {
   const auto folder = temporary("loop_replay");
   Listener listener;
