@@ -13,6 +13,7 @@
 #include "core/localize/region_reason.hpp"
 #include "core/localize/scatter_doubt.hpp"
 #include "core/localize/sector_doubt.hpp"
+#include "core/localize/track_shift.hpp"
 #include "core/localize/unplaced.hpp"
 #include "core/localize/unseen_arm.hpp"
 
@@ -32,9 +33,10 @@ struct Work {
   ProfileFactor alone{};  ///< what the flight said before it was told anything
   std::string kit{}, name{}, digest{};
   BiasGate gate{};
-  std::vector<Gate> checks{};      ///< of the whole flight: every anchor must pass them
-  std::vector<Gate> unseen_arm{};  ///< one for each anchor, where it is asked
-  bool antennas_apart{true};       ///< their vertical arms differ by what this flight can show
+  std::vector<Gate> checks{};               ///< of the whole flight: every anchor must pass them
+  std::vector<Gate> unseen_arm{};           ///< one for each anchor, where it is asked
+  std::vector<Eigen::Matrix3d> shift_m2{};  ///< of each region, by shifts of the track that may be
+  bool antennas_apart{true};                ///< their vertical arms differ by what this flight can show
 
   Eigen::Index antennas() const {
     return static_cast<Eigen::Index>(std::min<std::size_t>(rows.antennas.size(), k_most_antennas));
@@ -212,6 +214,25 @@ SharedSolution shared_of(const Work& work) {
   return shared;
 }
 
+/// Asks whether the track came back from each of its gaps where it was; the regions hold what the ranges
+/// cannot exclude.
+void ask_shift(const FlightData& flight, Work& work) {
+  const auto breaks = track_breaks(work.rows, flight.fixes, work.options.min_fix);
+  auto shift = check_track_shift(work.rows, breaks, work.fit, work.prior, work.options);
+  if (!shift) return;
+  work.checks.push_back(std::move(shift->gate));
+  if (shift->note) work.rows.notes.push_back(std::move(*shift->note));
+  work.shift_m2 = std::move(shift->covariance_m2);
+  for (std::size_t i = 0; i < work.shift_m2.size(); ++i)
+    work.fit.anchor_covariance[i].topLeftCorner<3, 3>() += work.shift_m2[i];
+}
+
+/// Doubt about the track, which error_budgets takes for that of the ranges.
+void move_shift_part(const Eigen::Matrix3d& shift_m2, ErrorBudget& budget) {
+  budget.part(ErrorSource::bias) -= shift_m2;
+  budget.part(ErrorSource::rtk) += shift_m2;
+}
+
 FlightSolution describe(Work& work, const FlightData& flight) {
   const FlightOptions& options = work.options;
   FlightSolution solution;
@@ -252,6 +273,7 @@ FlightSolution describe(Work& work, const FlightData& flight) {
       gates.insert(gates.end(), work.checks.begin(), work.checks.end());
       if (!work.unseen_arm.empty()) gates.push_back(work.unseen_arm[i]);
       anchor.budget = std::move(budgets[i]);
+      if (!work.shift_m2.empty()) move_shift_part(work.shift_m2[i], *anchor.budget);
       name_largest_part(anchor.estimate, *anchor.budget);
     }
     anchor.search = std::move(work.start.searches[i]);
@@ -369,6 +391,7 @@ Result<std::vector<FlightSolution>> solve_flights(std::span<const FlightData* co
     if (arm) work.checks.push_back(*arm);
     add_arm_doubt(work.rows, work.prior, work.options, work.fit);
     work.unseen_arm = unseen_arm_gates(work.rows, work.fit, work.prior, work.options);
+    ask_shift(*flights[i], work);
     if (work.rows.step_share > 0) work.checks.push_back(check_steps(work.rows.step_share, options));
     const auto others = others_of(all, i, options);
     if (!others.empty() && !options.fixed_bias_m)

@@ -56,6 +56,11 @@ const WORDS: Record<string, Words> = {
     fails: 'A wrong lever arm would not show: the aircraft turned too little, unseen error',
     unit: 'm',
   },
+  track_shift: {
+    passes: 'The track came back from its gaps where it was',
+    fails: 'A part of the track is shifted against the rest: wrong fix, or a base set up anew',
+    unit: 'χ²',
+  },
   settled: { passes: 'The joint solution settled', fails: 'The joint solution did not settle, rounds', unit: '' },
   target_sigma_m: {
     passes: 'Target of the flight reached, σ of the position',

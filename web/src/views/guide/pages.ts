@@ -506,6 +506,11 @@ export const PAGES: readonly Page[] = [
             'Look at the track around that time; fly again',
           ],
           [
+            'A part of the track is shifted',
+            'after a gap RTK fixed wrongly, or the base was set up anew',
+            'Exclude the positions before or after the gap, whichever is wrong; else fly again',
+          ],
+          [
             'Residuals are large',
             'walls on all ways, wrong lever arm, wrong radio',
             'Check the lever arm; compare with the other anchors',
