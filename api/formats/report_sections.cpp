@@ -109,6 +109,8 @@ constexpr std::array k_gate_words{
     GateWords{"lever_arm", "The lever arm fits the flight", "σ"},
     GateWords{"unseen_arm", "Error that a wrong lever arm would cause unseen", "m"},
     GateWords{"track_shift", "The track came back from its gaps where it was", "χ²"},
+    GateWords{"track", "Positions off the others as a whole", "%"},
+    GateWords{"profile", "The kit is as its other flights found it", "χ²"},
     GateWords{"settled", "Rounds until the joint solution settled", ""},
     GateWords{"target_sigma_m", "σ of the position", "m"},
     GateWords{"goal_h95_m", "95 % horizontal", "m"},

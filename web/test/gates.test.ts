@@ -1,7 +1,8 @@
+import { readFileSync } from 'node:fs';
 import { describe, expect, it } from 'vitest';
 import { row_of, row_of_estimate } from '../src/api/anchors';
 import { estimate } from '../src/live/messages';
-import { gate_limit, gate_line, gate_value } from '../src/ui/gates';
+import { gate_limit, gate_line, gate_sentence, gate_value } from '../src/ui/gates';
 import { why_not_done } from '../src/ui/words';
 import { STATUS_LOOK } from '../src/ui/marks';
 
@@ -27,6 +28,12 @@ describe('a gate is a sentence that is true as it stands', () => {
     expect(gate_line(gate('side', 0.93, 0.99, false))).toBe('The mirror solution is not excluded: 93 % (limit ≥ 99 %)');
     expect(gate_line(gate('rejected', 0.0667, 0.5, true))).toBe('Few ranges are rejected: 6.7 % (limit ≤ 50 %)');
     expect(gate_line(gate('redundancy', 12, 30, false))).toBe('Too few ranges beyond the unknowns: 12 (limit ≥ 30)');
+  });
+  it('for every gate that the report has words for', () => {
+    const report = readFileSync(new URL('../../api/formats/report_sections.cpp', import.meta.url), 'utf8'),
+      names = [...report.matchAll(/GateWords\{"([a-z_0-9]+)"/g)].map(([, name]) => name!);
+    expect(names.length).toBeGreaterThan(20);
+    expect(names.filter((name) => gate_sentence(gate(name, 1, 2, true)).endsWith(': passed'))).toEqual([]);
   });
   it('with as many digits as keep a failed value from its limit', () => {
     const close = gate('goal_h95_m', 0.2004, 0.2, false);

@@ -61,6 +61,16 @@ const WORDS: Record<string, Words> = {
     fails: 'A part of the track is shifted against the rest: wrong fix, or a base set up anew',
     unit: 'χ²',
   },
+  track: {
+    passes: 'Few positions are off the others as a whole',
+    fails: 'Too many positions are off the others as a whole: did the base move?',
+    unit: '%',
+  },
+  profile: {
+    passes: 'The kit is as its other flights found it',
+    fails: 'The kit is not as its other flights found it',
+    unit: 'χ²',
+  },
   settled: { passes: 'The joint solution settled', fails: 'The joint solution did not settle, rounds', unit: '' },
   target_sigma_m: {
     passes: 'Target of the flight reached, σ of the position',
