@@ -69,8 +69,8 @@ test('what is delivered arrives with seq after seq, and estimates follow', async
     'an estimate',
     (m) => (m.op === 'data' || m.op === 'snap') && m.sub === estimates.sub && JSON.stringify(m.data).includes('0x6a2'),
   );
+  const firstCount = client.messages.length; // before: the last of them may come sooner than the answer of their POST
   await deliver(150);
-  const firstCount = client.messages.length;
   await client.next('more ranges', (m) => m.op === 'data' && m.sub === ranges.sub, { from: firstCount });
   const data = client.messages.filter((m) => m.op === 'data' && m.sub === ranges.sub);
   for (let i = 1; i < data.length; i++) {
