@@ -140,7 +140,7 @@ export function Mapping({ found, back }: { found: Found; back: () => void }) {
         {track === ranges
           ? `${ranges.name}: ${grouped(ranges.rows.length)} rows with a place each.`
           : `${track.name}: ${grouped(track.rows.length)} positions. ${ranges.name}: ${grouped(ranges.rows.length)} ranges.`}{' '}
-        {missing.length === 0 ? 'All columns are known.' : `Say what is ${missing.join(', ')}.`}
+        {missing.length === 0 ? 'All columns are known.' : `Still needed: ${missing.join('; ')}.`}
       </p>
       {wide.length > 1 && wide.length <= MOST_ANCHORS && (
         <p>
@@ -160,7 +160,7 @@ export function Mapping({ found, back }: { found: Found; back: () => void }) {
           </button>
         </p>
       )}
-      <details open={missing.length > 0}>
+      <details open={!complete || needs.includes('degrees')}>
         <summary>Columns</summary>
         <div class="cols">
           <ColumnTable
