@@ -74,9 +74,9 @@ struct JobService::State {
   void save(const Job& job) {
     // A job that cannot be written is still shown live; after a restart it counts as interrupted.
     (void)jobs.update(job).has_value();
-    tell(job);
+    announce(job);
   }
-  void tell(const Job& job) {
+  void announce(const Job& job) {
     publish(job);
     {
       auto now = lanes.lock();
@@ -221,7 +221,7 @@ Result<Job> JobService::restart_elsewhere(const JobId& id) {
 
 Result<void> JobService::save(const Job& job) {
   BOOST_OUTCOME_TRYV(state_->jobs.update(job));
-  state_->tell(job);
+  state_->announce(job);
   return boost::outcome_v2::success();
 }
 

@@ -142,7 +142,8 @@ Result<void> WorkDesk::State::hand_out_anew(const WorkStatus& status) {
 
 Result<void> WorkDesk::State::conclude(const WorkStatus& status, Job job) {
   BOOST_OUTCOME_TRY(const auto outcome, deps.work.outcome(status.job));
-  Result<JobEnd> end = make_error(Errc::internal, "nobody takes in a job of kind " + job.kind);
+  Result<JobEnd> end =
+      make_error(Errc::internal, "this server has no handler for the result of a job of kind " + job.kind);
   if (outcome.error) {
     end = *outcome.error;
   } else if (const auto how = kinds.find(job.kind); how != kinds.end()) {

@@ -26,7 +26,7 @@ Result<bool> WorkRunner::run_one(std::chrono::milliseconds left_alone,
   BOOST_OUTCOME_TRY(const auto claim,
                     deps_.work.claim({deps_.worker, deps_.version, deps_.lease, left_alone}));
   if (!claim) return false;
-  deps_.tell("job claimed", *claim, "");
+  deps_.log("job claimed", *claim, "");
   run(*claim, stopping);
   return true;
 }
@@ -53,7 +53,7 @@ void WorkRunner::run(const WorkClaim& claim, const std::function<bool()>& stoppi
         return lost || canceled || stopping();
       });
   if (lost) {
-    deps_.tell("job taken over", claim, lost->message);
+    deps_.log("job taken over", claim, lost->message);
     return;
   }
   auto& work = deps_.work;
@@ -70,17 +70,17 @@ void WorkRunner::settle(const WorkClaim& claim, std::string_view what, const std
                         const std::function<Result<void>()>& store) {
   while (true) {
     const auto stored = store();
-    if (stored) return deps_.tell(what, claim, "");
+    if (stored) return deps_.log(what, claim, "");
     if (stored.error().code == Errc::conflict)
-      return deps_.tell("job taken over, nothing is stored", claim, stored.error().message);
+      return deps_.log("job taken over, nothing is stored", claim, stored.error().message);
     if (!database_away(stored.error())) {
-      deps_.tell("result refused by the database", claim, stored.error().message);
+      deps_.log("result refused by the database", claim, stored.error().message);
       (void)deps_.work.fail(claim, stored.error()).has_value();
       return;
     }
     // Nobody waits for a database that is away when it is time to go: the lease runs out, another begins
     // anew.
-    if (stopping()) return deps_.tell("database away, nothing is stored", claim, stored.error().message);
+    if (stopping()) return deps_.log("database away, nothing is stored", claim, stored.error().message);
     std::this_thread::sleep_for(k_store_again);
   }
 }

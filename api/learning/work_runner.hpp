@@ -21,7 +21,7 @@ class WorkRunner {
     std::chrono::milliseconds lease{15'000};
     bool announced{true};  ///< also shows itself among the workers while it works
     /// What happened to a claim, for the log; `why` may be empty.
-    std::function<void(std::string_view what, const WorkClaim& claim, std::string_view why)> tell;
+    std::function<void(std::string_view what, const WorkClaim& claim, std::string_view why)> log;
   };
   explicit WorkRunner(Deps deps) : deps_(std::move(deps)) {}
 

@@ -277,7 +277,7 @@ void add_foreign_source(CLI::App& command, ForeignSource& source) {
     const std::string option = std::string("--") + setting.name;
     if (command.get_option_no_throw(option) != nullptr) continue;
     command.add_option_function<std::string>(
-        option, [&source, name = setting.name](const std::string& text) { source.said[name] = text; },
+        option, [&source, name = setting.name](const std::string& text) { source.settings[name] = text; },
         setting.help);
   }
 }
@@ -293,7 +293,7 @@ Result<FlightData> read_foreign_source(const ForeignSource& source) {
   for (const auto& column : source.columns) {
     BOOST_OUTCOME_TRYV(read_column(column, options));
   }
-  for (const auto& [key, text] : source.said) {
+  for (const auto& [key, text] : source.settings) {
     const auto read = read_setting(key, text, options);
     if (!read) return wrong("--" + read.error().message);
   }

@@ -17,7 +17,7 @@ namespace anchord::cli {
 struct ForeignSource {
   std::string track, ranges, mapping;
   std::vector<std::string> columns;
-  std::map<std::string, std::string> said;  ///< option -> its text
+  std::map<std::string, std::string> settings;  ///< option -> its text
   bool column_for_each_anchor{false};
 
   bool given() const { return !track.empty() || !ranges.empty(); }

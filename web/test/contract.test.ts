@@ -1,6 +1,6 @@
 import { describe, expect, it } from 'vitest';
 import { address, call, get, given, list, url } from '../src/api/contract';
-import { num, said, str, words_of } from '../src/live/messages';
+import { num, unchecked, str, words_of } from '../src/live/messages';
 import type { Topic } from '../src/live/stream';
 
 describe('the address of a call of the contract', () => {
@@ -17,7 +17,7 @@ describe('the address of a call of the contract', () => {
 });
 
 describe('what is given', () => {
-  it('is what was said, zero and false included', () =>
+  it('is what was given, zero and false included', () =>
     expect(given<object>({ a: 0, b: false, c: '', d: null, e: undefined, f: 'x' })).toEqual({
       a: 0,
       b: false,
@@ -55,7 +55,7 @@ describe('what the contract does not have', () => {
     expect(requests).toHaveLength(11);
   });
   it('does not compile where a message is read', () => {
-    const o = said<Topic<'anchors.estimates'>>({ h95_m: 0.05, reason: 'r' });
+    const o = unchecked<Topic<'anchors.estimates'>>({ h95_m: 0.05, reason: 'r' });
     // @ts-expect-error no such member
     expect(num(o?.h95)).toBeNull();
     // @ts-expect-error a text, not a number
@@ -63,7 +63,7 @@ describe('what the contract does not have', () => {
     // @ts-expect-error a number, not a text
     expect(str(o?.h95_m)).toBe('');
     // @ts-expect-error no such topic
-    expect(said<Topic<'estimates'>>(null)).toBeNull();
+    expect(unchecked<Topic<'estimates'>>(null)).toBeNull();
     // @ts-expect-error a word of the enum is missing
     expect(words_of<Topic<'events'>['level']>()('info', 'warning')).toHaveLength(2);
     expect([num(o?.h95_m), str(o?.reason)]).toEqual([0.05, 'r']);

@@ -29,7 +29,7 @@ const flight = (
   ranges: string,
   more: Partial<About> = {},
   declared = null as ReturnType<typeof declared_of> | null,
-  said: Partial<Reading> = {},
+  given: Partial<Reading> = {},
 ) => {
   const [t, r] = [table_of('track.csv', track), table_of('ranges.csv', ranges)],
     [tc, rc] = [guessed_track(t), guessed_ranges(r)];
@@ -38,7 +38,7 @@ const flight = (
     tc,
     r,
     rc,
-    { ...guessed_reading(t, tc, r, rc, declared), heights: 'ellipsoidal', ...said },
+    { ...guessed_reading(t, tc, r, rc, declared), heights: 'ellipsoidal', ...given },
     { ...about, ...more },
     declared,
   );

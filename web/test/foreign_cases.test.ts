@@ -14,7 +14,7 @@ import { anchor_columns, decoded, table_of, with_a_row_for_each_range } from '..
 /// Cases that the command line runs too, so that both read the same tables the same way.
 const file = (name: string): unknown =>
   JSON.parse(readFileSync(new URL(`../../tests/data/import/${name}`, import.meta.url), 'utf8'));
-interface Said extends Partial<Omit<Reading, 'track_time' | 'range_time' | 'fix'>> {
+interface Given extends Partial<Omit<Reading, 'track_time' | 'range_time' | 'fix'>> {
   readonly track_columns?: Columns;
   readonly range_columns?: Columns;
   readonly fix_numbers?: Reading['fix'];
@@ -27,7 +27,7 @@ interface Case {
   readonly track?: string;
   readonly track_base64?: string;
   readonly ranges: string;
-  readonly said?: Said;
+  readonly given?: Given;
   readonly column_for_each_anchor?: boolean;
   readonly needs?: readonly string[];
   readonly error?: string;
@@ -39,7 +39,7 @@ interface Case {
 }
 
 function run(c: Case) {
-  const { track_columns, range_columns, fix_numbers, track_time_scale, epoch_utc, tag, ...said } = c.said ?? {},
+  const { track_columns, range_columns, fix_numbers, track_time_scale, epoch_utc, tag, ...given } = c.given ?? {},
     bytes = c.track_base64 ? Buffer.from(c.track_base64, 'base64') : new TextEncoder().encode(c.track),
     track = table_of('track', decoded(bytes)),
     wide = table_of('ranges', c.ranges),
@@ -53,7 +53,7 @@ function run(c: Case) {
     guess = guessed_reading(track, tc, ranges, rc, null),
     reading: Reading = {
       ...guess,
-      ...said,
+      ...given,
       ...(fix_numbers ? { fix: fix_numbers } : {}),
       track_time: { ...guess.track_time, ...(track_time_scale ? { scale: track_time_scale } : {}) },
     },

@@ -22,23 +22,23 @@ Json file(const std::string& name) {
   return Json::parse(in);
 }
 
-ForeignOptions said_of(const Json& one) {
+ForeignOptions given_of(const Json& one) {
   ForeignOptions out;
   out.tag = "0x6e01";
-  if (!one.contains("said")) return out;
-  const Json& said = one["said"];
-  out.tag = said.value("tag", out.tag);
-  if (said.contains("crs")) out.crs = said["crs"];
-  if (said.contains("heights")) out.heights = said["heights"];
-  if (said.contains("fix_numbers"))
-    out.fix_numbers = k_fix_numbers_words.find(said["fix_numbers"].get<std::string>());
-  if (said.contains("track_time_scale"))
-    out.track_time_scale = k_time_scale_words.find(said["track_time_scale"].get<std::string>());
-  if (said.contains("epoch_utc"))
-    out.epoch_us = parse_rfc3339(said["epoch_utc"].get<std::string>()).value().us();
+  if (!one.contains("given")) return out;
+  const Json& given = one["given"];
+  out.tag = given.value("tag", out.tag);
+  if (given.contains("crs")) out.crs = given["crs"];
+  if (given.contains("heights")) out.heights = given["heights"];
+  if (given.contains("fix_numbers"))
+    out.fix_numbers = k_fix_numbers_words.find(given["fix_numbers"].get<std::string>());
+  if (given.contains("track_time_scale"))
+    out.track_time_scale = k_time_scale_words.find(given["track_time_scale"].get<std::string>());
+  if (given.contains("epoch_utc"))
+    out.epoch_us = parse_rfc3339(given["epoch_utc"].get<std::string>()).value().us();
   for (const auto& [key, columns] :
        {std::pair{"track_columns", &out.track_columns}, std::pair{"range_columns", &out.range_columns}}) {
-    const Json named = said.value(key, Json::object());
+    const Json named = given.value(key, Json::object());
     for (const auto& [field, column] : named.items()) (*columns)[field] = column.get<std::string>();
   }
   return out;
@@ -110,11 +110,11 @@ std::string run(const Json& one) {
     for (const auto& [field, column] : guessed_range_columns(table)) claimed.push_back(column);
     table = std::move(table).with_a_row_for_each_range(table.number_columns(claimed));
   }
-  const auto options = said_of(one);
+  const auto options = given_of(one);
   EXPECT_EQ(Json(foreign_needs(track.value(), table, options)), one.value("needs", Json::array()));
   const auto read = foreign_flight(track.value(), table, options);
   if (!read) return one.contains("needs") ? "" : read.error().message;
-  EXPECT_FALSE(one.contains("needs")) << "taken without what has to be said";
+  EXPECT_FALSE(one.contains("needs")) << "taken without what has to be given";
   const auto& flight = read.value();
   EXPECT_EQ(flight.data.fixes.size(), one["fixes"].size());
   for (std::size_t i = 0; i < std::min(flight.data.fixes.size(), one["fixes"].size()); ++i)

@@ -17,7 +17,7 @@ import {
   type EstimateMsg,
   type GateMsg,
   type Mirror,
-  type Said,
+  type Unchecked,
 } from '../live/messages';
 import type { Topic } from '../live/stream';
 import { ellipse_from_covariance, enu_from_geodetic } from '../map/enu';
@@ -74,7 +74,7 @@ export const row_of_estimate = (e: EstimateMsg): AnchorRow => ({
   height_msl_m: null,
 });
 
-function budget_of(v: Said<Wire<'ErrorBudget'>>): Budget | null {
+function budget_of(v: Unchecked<Wire<'ErrorBudget'>>): Budget | null {
   const o = obj(v),
     sources = obj(o?.sources);
   if (!o || !sources) return null;
@@ -84,7 +84,7 @@ function budget_of(v: Said<Wire<'ErrorBudget'>>): Budget | null {
     .sort((a, b) => b.share - a.share);
   return { shares, help: str(o.help_text) };
 }
-function goal_of(v: Said<Wire<'AnchorGoal'>>): AnchorGoal | null {
+function goal_of(v: Unchecked<Wire<'AnchorGoal'>>): AnchorGoal | null {
   const o = obj(v);
   return o && { words: str(o.words), reached: o.reached === true, limits: gates_of(o.limits) };
 }
@@ -97,15 +97,15 @@ export const over_goal_words = (r: AnchorRow): string =>
         .map(gate_value)
         .join(', ')}`;
 type Lonlat = Readonly<Record<'lon' | 'lat' | 'h_m', number | null>>;
-const place_at = (coordinates: Said<readonly number[]>): Lonlat => {
+const place_at = (coordinates: Unchecked<readonly number[]>): Lonlat => {
   const c = vec3(coordinates);
   return { lon: c?.[0] ?? null, lat: c?.[1] ?? null, h_m: c?.[2] ?? null };
 };
-function mirror_of(v: Said<Wire<'Mirror'>>): Mirror | null {
+function mirror_of(v: Unchecked<Wire<'Mirror'>>): Mirror | null {
   const o = obj(v);
   return o && { ...place_at(o.coordinates), enu_m: vec3(o.enu_m), probability: num(o.probability) };
 }
-function crs_words(v: Said<Wire<'Crs'>>): string {
+function crs_words(v: Unchecked<Wire<'Crs'>>): string {
   const o = obj(v),
     base = obj(o?.base);
   if (!o) return '';
@@ -133,7 +133,7 @@ function status_of(status: string, verdict: string, acceptable: unknown, goal: A
 
 /// `properties` of a GeoJSON feature or one anchor of a calibration; `geometry` beside it.
 type Described = Partial<Wire<'Anchor'>['properties']> & Partial<Omit<Wire<'AnchorResult'>, 'geometry'>>;
-export function row_of(v: Said<Described>, geometry: Said<Wire<'Point'>>): AnchorRow | null {
+export function row_of(v: Unchecked<Described>, geometry: Unchecked<Wire<'Point'>>): AnchorRow | null {
   const p = obj(v),
     network_id = str(p?.network_id);
   if (!p || !network_id) return null;
@@ -161,7 +161,7 @@ export function row_of(v: Said<Described>, geometry: Said<Wire<'Point'>>): Ancho
     n_ranges: quality?.n_ranges,
     n_refused: quality?.n_refused,
     rms_residual_m: quality?.rms_residual_m,
-  } satisfies Said<Topic<'anchors.estimates'>>);
+  } satisfies Unchecked<Topic<'anchors.estimates'>>);
   if (!base) return null;
   const other_side = mirror_of(p.mirror),
     goal = goal_of(p.goal);
@@ -193,7 +193,7 @@ export interface Collected {
   readonly rows: AnchorRow[];
   readonly revision: number | null;
 }
-export function rows_of_collection(answer: Said<Wire<'AnchorCollection'>>): Collected {
+export function rows_of_collection(answer: Unchecked<Wire<'AnchorCollection'>>): Collected {
   const rows = objects(obj(answer)?.features).flatMap((f) => {
     const row = row_of(f.properties, f.geometry);
     return row ? [row] : [];
@@ -223,7 +223,7 @@ export interface Calibration {
   readonly rows: readonly AnchorRow[];
 }
 /// Null: still a job, for whoever waited for it.
-export function calibration_of(answer: Said<Wire<'Calibration'>>): Calibration | null {
+export function calibration_of(answer: Unchecked<Wire<'Calibration'>>): Calibration | null {
   const o = obj(answer);
   if (!o || !str(o.id) || !o.anchors) return null;
   return {
@@ -301,7 +301,7 @@ export interface Past {
   readonly horizontal_m: number | null;
   readonly vertical_m: number | null;
 }
-export function past_of(answer: Said<readonly Wire<'Published'>[]>): Past[] {
+export function past_of(answer: Unchecked<readonly Wire<'Published'>[]>): Past[] {
   const all = objects(answer);
   return all.map((o, i) => {
     const here = place_at(obj(o.geometry)?.coordinates),

@@ -1,7 +1,7 @@
 /// A flight into this server, as a mission of its own that is finished when all rows are in.
 import { ApiError, idempotency_key } from './client';
 import { call, type Answered, type Wire } from './contract';
-import { count, elements, num, obj, str, type Said } from '../live/messages';
+import { count, elements, num, obj, str, type Unchecked } from '../live/messages';
 
 const BATCH = 5000; ///< rows in a request: some hundred kilobytes
 export interface Sent {
@@ -14,12 +14,12 @@ export interface Sent {
 
 /// What became of rows. Where not one was taken it comes as a problem (422) with the same members.
 export async function row_report(
-  sending: Promise<Pick<Answered<Said<Wire<'IngestAnswer'>>>, 'body'>>,
-): Promise<Said<Wire<'IngestAnswer'>>> {
+  sending: Promise<Pick<Answered<Unchecked<Wire<'IngestAnswer'>>>, 'body'>>,
+): Promise<Unchecked<Wire<'IngestAnswer'>>> {
   try {
     return (await sending).body;
   } catch (e) {
-    const refused = e instanceof ApiError ? (e.body as Said<Wire<'IngestProblem'>>) : null;
+    const refused = e instanceof ApiError ? (e.body as Unchecked<Wire<'IngestProblem'>>) : null;
     if (num(obj(refused)?.rejected) !== null) return refused;
     throw e;
   }

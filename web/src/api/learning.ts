@@ -1,5 +1,5 @@
 /// Training runs, models and their numbers, as the Models view shows them. Positive is LOS: fp is NLOS called LOS, the error to avoid.
-import { num, obj, str, type Said } from '../live/messages';
+import { num, obj, str, type Unchecked } from '../live/messages';
 import { call, get, list, type Wire } from './contract';
 
 export type Task = Wire<'LearningTask'>;
@@ -78,13 +78,13 @@ export interface RunNumbers {
 
 const tail = (path: string | null): string | null => path?.split('/').pop() || null;
 
-function confusion_of(v: Said<Confusion>): Confusion | null {
+function confusion_of(v: Unchecked<Confusion>): Confusion | null {
   const o = obj(v),
     [tp, fp, fn, tn] = [num(o?.tp), num(o?.fp), num(o?.fn), num(o?.tn)];
   return tp === null || fp === null || fn === null || tn === null ? null : { tp, fp, fn, tn };
 }
 type Scored = Partial<Wire<'ModelMetrics'> & Pick<Wire<'TestResult'>, 'bias' | 'confusion'>>;
-function scores_of(v: Said<Scored>): Scores {
+function scores_of(v: Unchecked<Scored>): Scores {
   const o = obj(v),
     bias = obj(o?.bias);
   return {

@@ -1,5 +1,5 @@
 /// Stored ranges and campaign samples, as the Measurements view shows them: one shape for both, truth and features where they are known.
-import { num, obj, objects, str, type Said } from '../live/messages';
+import { num, obj, objects, str, type Unchecked } from '../live/messages';
 import type { RangeClass } from '../state/scene';
 import { get, given, list, url, type Wire } from './contract';
 import type { operations } from './generated/schema';
@@ -36,16 +36,16 @@ export interface Impulse {
 const DW1000_TAP_NS = 1.0016; ///< 1/(2 x 499.2 MHz): the spacing where a response names none
 const FEATURE_MAX = 40;
 
-function features_of(v: Said<Wire<'Features'>>): Record<string, number> {
+function features_of(v: Unchecked<Wire<'Features'>>): Record<string, number> {
   const known = Object.entries(obj(v) ?? {}).filter((e): e is [string, number] => num(e[1]) !== null);
   return Object.fromEntries(known.slice(0, FEATURE_MAX));
 }
-function predicted_of(v: Said<Wire<'PredictedClass'>>): Predicted | null {
+function predicted_of(v: Unchecked<Wire<'PredictedClass'>>): Predicted | null {
   const o = obj(v),
     cls = str(o?.class);
   return cls === 'los' || cls === 'nlos' || cls === 'unclear' ? { cls, p_los: num(o?.p_los) } : null;
 }
-type Row<T> = Exclude<Said<T>, null | undefined>;
+type Row<T> = Exclude<Unchecked<T>, null | undefined>;
 function range_of(o: Row<Wire<'Range'>>): Sample | null {
   const id = num(o.id),
     distance_m = num(o.distance_m),
@@ -162,7 +162,7 @@ export async function page_of(source: Source, filter: Filter, w: Wanted): Promis
     cursor: w.cursor,
   });
   const pick = <T>(rows: readonly T[], read: (o: Row<T>) => Sample | null): Sample[] =>
-    objects<Said<T>>(rows as readonly Said<T>[])
+    objects<Unchecked<T>>(rows as readonly Unchecked<T>[])
       .map((o) => read(o as Row<T>))
       .filter((s) => s !== null);
   if (source.kind === 'mission') {
@@ -188,7 +188,7 @@ export const campaigns = async (): Promise<Source[]> =>
     .map(({ id, name }) => ({ kind: 'campaign', id, name }));
 
 /// Base64 of int16 pairs re, im, little endian, as the server keeps what the radio gave.
-export function impulse_of(answer: Said<Wire<'Cir'>>): Impulse | null {
+export function impulse_of(answer: Unchecked<Wire<'Cir'>>): Impulse | null {
   const o = obj(answer),
     raw = atob(str(o?.b64));
   const bytes = new DataView(Uint8Array.from(raw, (c) => c.charCodeAt(0)).buffer),

@@ -1,5 +1,5 @@
 /// Plans: what is to be flown. Corners and waypoints in WGS84, as the server keeps them.
-import { elements, num, obj, objects, str, texts, vec3, type Said } from '../live/messages';
+import { elements, num, obj, objects, str, texts, vec3, type Unchecked } from '../live/messages';
 import { idempotency_key } from './client';
 import { call, get, list, url, type Wire } from './contract';
 import { LIMITS } from './generated/limits';
@@ -86,7 +86,7 @@ export const EMPTY: Plan = {
 };
 
 /// A GeoJSON ring closes itself; the page works with open ones.
-function ring_of(polygon: Said<Wire<'GeoPolygon'>>): Corner[] {
+function ring_of(polygon: Unchecked<Wire<'GeoPolygon'>>): Corner[] {
   const ring = elements(elements(obj(polygon)?.coordinates)[0]);
   const corners = ring.flatMap((c) => {
     const [lon, lat] = [num(elements(c)[0]), num(elements(c)[1])];
@@ -95,8 +95,8 @@ function ring_of(polygon: Said<Wire<'GeoPolygon'>>): Corner[] {
   const [first, last] = [corners[0], corners[corners.length - 1]];
   return corners.length > 1 && first!.lon === last!.lon && first!.lat === last!.lat ? corners.slice(0, -1) : corners;
 }
-function plan_of(answer: Said<Wire<'Plan'> | Wire<'PlanBody'>>): Plan {
-  const o: Said<PlanBody & { links: unknown }> = obj(answer);
+function plan_of(answer: Unchecked<Wire<'Plan'> | Wire<'PlanBody'>>): Plan {
+  const o: Unchecked<PlanBody & { links: unknown }> = obj(answer);
   const {
     id,
     revision,

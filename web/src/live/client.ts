@@ -1,5 +1,5 @@
 import { Whole } from './deltas';
-import { elements, num, obj, str, type Said } from './messages';
+import { elements, num, obj, str, type Unchecked } from './messages';
 import type { LinkState, LiveSink, LiveSource } from './source';
 import type { Received, Sent, TopicName, TopicParams } from './stream';
 
@@ -21,7 +21,7 @@ export interface Environment {
 
 /// A message of the server before anybody has looked at more of it than its op.
 type Frame<Op extends Received['op']> = Op extends unknown
-  ? Exclude<Said<Extract<Received, { op: Op }>>, null | undefined> & { readonly op: Op }
+  ? Exclude<Unchecked<Extract<Received, { op: Op }>>, null | undefined> & { readonly op: Op }
   : never;
 
 interface Topic {

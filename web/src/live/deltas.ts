@@ -1,6 +1,6 @@
 /// Estimates come whole once, then as what changed of them (asyncapi: sub, params.deltas). Put together again here, so that nothing behind the
 /// client knows of it. No DOM.
-import { obj, said, str } from './messages';
+import { obj, str, unchecked } from './messages';
 import type { Topic } from './stream';
 
 type Obj = Readonly<Record<string, unknown>>;
@@ -36,7 +36,7 @@ export class Whole {
     const out: Obj[] = [];
     for (const o of this.list(data)) {
       const before = this.known.get(this.key(o));
-      if (!before && said<Topic<'anchors.estimates'>>(o)?.status === undefined) return null;
+      if (!before && unchecked<Topic<'anchors.estimates'>>(o)?.status === undefined) return null;
       const now = before ? merged(before, o) : o;
       this.known.set(this.key(o), now);
       out.push(now);
@@ -47,7 +47,7 @@ export class Whole {
     return (Array.isArray(data) ? data : [data]).map(obj).filter((o) => o !== null);
   }
   private key(o: Obj): string {
-    const of = said<Topic<'anchors.estimates'>>(o);
+    const of = unchecked<Topic<'anchors.estimates'>>(o);
     return `${str(of?.mission)} ${str(of?.anchor)}`;
   }
 }

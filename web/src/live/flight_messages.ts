@@ -5,13 +5,13 @@ import {
   num,
   obj,
   objects,
-  said,
+  unchecked,
   str,
   texts,
   vec3,
   word,
   words_of,
-  type Said,
+  type Unchecked,
   type Vec3,
 } from './messages';
 import type { Topic } from './stream';
@@ -141,7 +141,7 @@ export interface ProfileMsg extends Readonly<Pick<Topic<'mission.turn'>, 'missio
 }
 
 type Point = Grid['candidates'][number];
-function spot(v: Said<Pick<Point, 'lon' | 'lat' | 'height_above_ground_m' | 'enu_m'>>): Spot | null {
+function spot(v: Unchecked<Pick<Point, 'lon' | 'lat' | 'height_above_ground_m' | 'enu_m'>>): Spot | null {
   const o = obj(v),
     [lon, lat] = [num(o?.lon), num(o?.lat)];
   return lon === null || lat === null
@@ -149,7 +149,7 @@ function spot(v: Said<Pick<Point, 'lon' | 'lat' | 'height_above_ground_m' | 'enu
     : { lon, lat, height_m: num(o?.height_above_ground_m), plan_m: vec3(o?.enu_m) };
 }
 
-export function drone(v: Said<Aircraft>): DroneMsg | null {
+export function drone(v: Unchecked<Aircraft>): DroneMsg | null {
   const d = obj(v);
   return (
     d && {
@@ -181,7 +181,7 @@ export function drone(v: Said<Aircraft>): DroneMsg | null {
   );
 }
 export function procedure(v: unknown): ProcedureMsg | null {
-  const o = said<Procedure>(v);
+  const o = unchecked<Procedure>(v);
   if (!o || !str(o.mission)) return null;
   const target = spot(o.target),
     alarm = obj(o.alarm),
@@ -239,7 +239,7 @@ export function procedure(v: unknown): ProcedureMsg | null {
   };
 }
 export function grid(v: unknown): GridMsg | null {
-  const o = said<Grid>(v);
+  const o = unchecked<Grid>(v);
   if (!o || !str(o.mission)) return null;
   const candidates = objects(o.candidates).map((c) => {
     const at = spot(c);
@@ -264,7 +264,7 @@ export function grid(v: unknown): GridMsg | null {
   };
 }
 type Profile = Topic<'mission.turn'> | Topic<'mission.height'>;
-function profile(o: Said<Profile>, best: number | null, sigma: number | null): ProfileMsg | null {
+function profile(o: Unchecked<Profile>, best: number | null, sigma: number | null): ProfileMsg | null {
   if (!o || !str(o.mission) || !str(o.anchor)) return null;
   const samples = elements(o.samples).flatMap((s): [number, number][] => {
     const [at, level] = [num(elements(s)[0]), num(elements(s)[1])];
@@ -281,10 +281,10 @@ function profile(o: Said<Profile>, best: number | null, sigma: number | null): P
   };
 }
 export function turn(v: unknown): ProfileMsg | null {
-  const o = said<Topic<'mission.turn'>>(v);
+  const o = unchecked<Topic<'mission.turn'>>(v);
   return profile(o, num(o?.bearing_deg), num(o?.sigma_deg));
 }
 export function height(v: unknown): ProfileMsg | null {
-  const o = said<Topic<'mission.height'>>(v);
+  const o = unchecked<Topic<'mission.height'>>(v);
   return profile(o, num(o?.height_m), num(o?.sigma_m));
 }

@@ -62,11 +62,11 @@ export type RevisionMsg = Readonly<Topic<'revisions'>>;
 type Obj = Record<string, unknown>;
 /// What the contract says of a message or an answer, until a guard has looked: a server of another version may leave any of it out. A member that the
 /// contract does not have, or has as something else than the guard reads, does not compile.
-export type Said<T> =
+export type Unchecked<T> =
   | (T extends readonly (infer E)[]
-      ? readonly Said<E>[]
+      ? readonly Unchecked<E>[]
       : T extends object
-        ? { readonly [K in keyof T]?: Said<T[K]> }
+        ? { readonly [K in keyof T]?: Unchecked<T[K]> }
         : T)
   | null
   | undefined;
@@ -86,7 +86,7 @@ export const elements = <E>(v: readonly E[] | null | undefined): readonly E[] =>
   Array.isArray(v) ? (v as readonly E[]) : [];
 export const objects = <E>(v: readonly E[] | null | undefined): Extract<E, object>[] =>
   elements(v).flatMap((e) => (obj(e) ? [e as Extract<E, object>] : []));
-export const texts = (v: Said<readonly string[]>): string[] =>
+export const texts = (v: Unchecked<readonly string[]>): string[] =>
   elements(v).filter((s): s is string => typeof s === 'string');
 
 export const fix_class = (v: string | null | undefined): FixClass => word(v, FIX, 'none');
@@ -99,7 +99,7 @@ export function vec3<V>(v: V & Given<Numbers, V>): Vec3 | null {
 export function cov6(v: Numbers | null | undefined): readonly number[] | null {
   return Array.isArray(v) && v.length === 6 && v.every((x) => num<unknown>(x) !== null) ? (v as number[]) : null;
 }
-export function ellipse(v: Said<Ellipse95>): Ellipse95 | null {
+export function ellipse(v: Unchecked<Ellipse95>): Ellipse95 | null {
   const o = obj(v);
   const [major_m, minor_m, azimuth_deg] = [num(o?.major_m), num(o?.minor_m), num(o?.azimuth_deg)];
   return major_m == null || minor_m == null || azimuth_deg == null ? null : { major_m, minor_m, azimuth_deg };
@@ -126,15 +126,16 @@ const MISSION_STATE = words_of<State['state']>()('planned', 'recording', 'finish
   PRIORITY = words_of<AlarmMsg['priority']>()('critical', 'warning', 'advisory');
 
 /// What came as a message of the topic; null where it is no object.
-export const said = <T>(v: unknown): Extract<Said<T>, object> | null => obj(v) as Extract<Said<T>, object> | null;
-const place = (o: Exclude<Said<Place>, null | undefined>): Place => ({
+export const unchecked = <T>(v: unknown): Extract<Unchecked<T>, object> | null =>
+  obj(v) as Extract<Unchecked<T>, object> | null;
+const place = (o: Exclude<Unchecked<Place>, null | undefined>): Place => ({
   lon: num(o.lon),
   lat: num(o.lat),
   h_m: num(o.h_m),
 });
 
 export function pose(v: unknown): Pose | null {
-  const o = said<Topic<'drone.pose'>>(v);
+  const o = unchecked<Topic<'drone.pose'>>(v);
   const t_us = num(o?.t_us);
   if (!o || t_us == null) return null;
   return {
@@ -150,7 +151,7 @@ export function pose(v: unknown): Pose | null {
   };
 }
 export function rtk(v: unknown): Rtk | null {
-  const o = said<Topic<'rtk.status'>>(v);
+  const o = unchecked<Topic<'rtk.status'>>(v);
   const t_us = num(o?.t_us);
   if (!o || t_us == null) return null;
   return {
@@ -163,7 +164,7 @@ export function rtk(v: unknown): Rtk | null {
   };
 }
 export function range(v: unknown): RangeMsg | null {
-  const o = said<Topic<'ranges'>>(v);
+  const o = unchecked<Topic<'ranges'>>(v);
   const [t_us, distance_m] = [num(o?.t_us), num(o?.distance_m)];
   if (!o || t_us == null || distance_m == null || !str(o.anchor)) return null;
   return {
@@ -180,18 +181,18 @@ export function range(v: unknown): RangeMsg | null {
     refused: str(o.refused) || null,
   };
 }
-export function mirror(v: Said<Estimate['mirror']>): Mirror | null {
+export function mirror(v: Unchecked<Estimate['mirror']>): Mirror | null {
   const o = obj(v);
   return o && { ...place(o), enu_m: vec3(o.enu_m), probability: num(o.probability) };
 }
-export const gates = (v: Said<readonly GateMsg[]>): GateMsg[] =>
+export const gates = (v: Unchecked<readonly GateMsg[]>): GateMsg[] =>
   objects(v).flatMap((o) =>
     str(o.name)
       ? [{ name: str(o.name), value: num(o.value), limit: num(o.limit), passed: o.passed === true, why: str(o.why) }]
       : [],
   );
 export function estimate(v: unknown): EstimateMsg | null {
-  const o = said<Topic<'anchors.estimates'>>(v);
+  const o = unchecked<Topic<'anchors.estimates'>>(v);
   if (!o || !str(o.anchor)) return null;
   return {
     mission: str(o.mission),
@@ -217,7 +218,7 @@ export function estimate(v: unknown): EstimateMsg | null {
   };
 }
 export function mission(v: unknown): MissionMsg | null {
-  const o = said<Topic<'mission.state'>>(v);
+  const o = unchecked<Topic<'mission.state'>>(v);
   if (!o || !str(o.mission)) return null;
   const g = obj(o.origin);
   const [lon, lat, h_m] = [num(g?.lon), num(g?.lat), num(g?.h_m)];
@@ -240,7 +241,7 @@ export function mission(v: unknown): MissionMsg | null {
   };
 }
 export function device(v: unknown): DeviceMsg | null {
-  const o = said<Topic<'devices'>>(v);
+  const o = unchecked<Topic<'devices'>>(v);
   return o && str(o.network_id)
     ? {
         network_id: str(o.network_id),
@@ -252,7 +253,7 @@ export function device(v: unknown): DeviceMsg | null {
     : null;
 }
 export function system(v: unknown): SystemMsg | null {
-  const o = said<Topic<'system'>>(v);
+  const o = unchecked<Topic<'system'>>(v);
   return (
     o && {
       t_us: count(o.t_us),
@@ -266,7 +267,7 @@ export function system(v: unknown): SystemMsg | null {
   );
 }
 export function event(v: unknown): EventMsg | null {
-  const o = said<Topic<'events'>>(v);
+  const o = unchecked<Topic<'events'>>(v);
   return (
     o && {
       id: str(o.id),
@@ -279,7 +280,7 @@ export function event(v: unknown): EventMsg | null {
   );
 }
 export function alarm(v: unknown): AlarmMsg | null {
-  const o = said<Topic<'alarms'>>(v);
+  const o = unchecked<Topic<'alarms'>>(v);
   return o && str(o.id)
     ? {
         id: str(o.id),
@@ -291,7 +292,7 @@ export function alarm(v: unknown): AlarmMsg | null {
     : null;
 }
 export function revision(v: unknown): RevisionMsg | null {
-  const o = said<Topic<'revisions'>>(v);
+  const o = unchecked<Topic<'revisions'>>(v);
   const n = num(o?.revision);
   return o && n != null ? { revision: n, t_us: count(o.t_us), calibration: str(o.calibration) } : null;
 }

@@ -11,7 +11,7 @@ import {
   str,
   vec3,
   type MissionMsg,
-  type Said,
+  type Unchecked,
 } from '../live/messages';
 import type { Topic } from '../live/stream';
 import { enu_from_geodetic } from '../map/enu';
@@ -33,7 +33,7 @@ const micros = (rfc3339: string | null | undefined): number | null => {
   const ms = Date.parse(str(rfc3339));
   return Number.isNaN(ms) ? null : ms * 1000;
 };
-export function mission_of_rest(v: Said<Wire<'Mission'>>): MissionMsg | null {
+export function mission_of_rest(v: Unchecked<Wire<'Mission'>>): MissionMsg | null {
   const o = obj(v),
     created_us = micros(o?.created_at);
   return (
@@ -47,7 +47,7 @@ export function mission_of_rest(v: Said<Wire<'Mission'>>): MissionMsg | null {
       started_us: created_us,
       n_ranges: num(o.n_ranges),
       n_fixes: num(o.n_fixes),
-    } satisfies Said<Topic<'mission.state'>>)
+    } satisfies Unchecked<Topic<'mission.state'>>)
   );
 }
 export async function load_missions(): Promise<void> {
@@ -96,7 +96,7 @@ async function load_track(m: MissionMsg): Promise<void> {
 }
 const TRACK_SINCE = (m: MissionMsg): string => new Date(Math.max(0, m.t_us / 1000 - 480_000)).toISOString(); ///< eight minutes: one page even at 20 Hz
 /// GeoJSON of a track as points about the origin of the flight; none where a track on the globe has no origin yet.
-export function trail_of(feature: Said<Wire<'Track'>>, origin: MissionMsg['origin']): TrailPoint[] {
+export function trail_of(feature: Unchecked<Wire<'Track'>>, origin: MissionMsg['origin']): TrailPoint[] {
   const p = obj(feature?.properties),
     times = elements(p?.t_us),
     fixes = elements(p?.fix);

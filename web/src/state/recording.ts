@@ -15,7 +15,7 @@ import {
   type MissionMsg,
   type Pose,
   type RangeMsg,
-  type Said,
+  type Unchecked,
 } from '../live/messages';
 import type { Topic } from '../live/stream';
 import { enu_from_geodetic, type Geodetic } from '../map/enu';
@@ -41,13 +41,13 @@ const PAGE = 10_000,
   PAGES_MAX = 12; ///< 120 000 rows of each: three hours at 10 Hz; more is said to be cut
 
 interface Page<Row> {
-  readonly items?: readonly Said<Row>[] | null;
+  readonly items?: readonly Unchecked<Row>[] | null;
   readonly next_cursor?: string | null;
 }
 async function pages<Row, T>(
   page: (query: { mission: string; limit: number; cursor?: string }) => Promise<Page<Row> | null>,
   mission: string,
-  of: (row: Said<Row>) => T | null,
+  of: (row: Unchecked<Row>) => T | null,
 ): Promise<{ rows: T[]; cut: boolean }> {
   const rows: T[] = [];
   let cursor = '';
@@ -64,7 +64,7 @@ async function pages<Row, T>(
 }
 
 /// The first place on the globe is the origin of a flight whose own is not known any more.
-export function poses_of(rows: readonly Said<Wire<'Fix'>>[], mission: string, origin: Geodetic | null): Pose[] {
+export function poses_of(rows: readonly Unchecked<Wire<'Fix'>>[], mission: string, origin: Geodetic | null): Pose[] {
   let zero = origin;
   return objects(rows).flatMap((o) => {
     const t_us = num(o.t_us),
@@ -102,7 +102,7 @@ export function poses_of(rows: readonly Said<Wire<'Fix'>>[], mission: string, or
 /// Class and correction are what the promoted models make of it now; without one it is as measured.
 export const range_of =
   (mission: string) =>
-  (row: Said<Wire<'Range'>>): RangeMsg | null => {
+  (row: Unchecked<Wire<'Range'>>): RangeMsg | null => {
     const o = obj(row),
       t_us = num(o?.t_us),
       distance_m = num(o?.distance_m),
@@ -125,7 +125,11 @@ export const range_of =
   };
 
 /// Events within the recording, in the order of the flight: the server gives the newest first.
-export const marks_of = (events: readonly Said<Wire<'Event'>>[], from_us: number, to_us: number): Recording['marks'] =>
+export const marks_of = (
+  events: readonly Unchecked<Wire<'Event'>>[],
+  from_us: number,
+  to_us: number,
+): Recording['marks'] =>
   objects(events)
     .map((e) => ({ t_us: count(e.t_us), level: str(e.level), code: str(e.code), text: str(e.text) }))
     .filter((e) => e.t_us >= from_us && e.t_us <= to_us)

@@ -1,7 +1,7 @@
 import { computed, signal } from '@preact/signals';
 import { ApiError } from '../api/client';
 import { call, get, type Wire } from '../api/contract';
-import { obj, str, texts, type Said } from '../live/messages';
+import { obj, str, texts, type Unchecked } from '../live/messages';
 
 export interface Me {
   readonly name: string;
@@ -15,7 +15,7 @@ export const may = (...roles: string[]): boolean =>
   !!me.value && (me.value.auth === 'off' || me.value.roles.some((r) => r === 'admin' || roles.includes(r)));
 export const may_publish = computed(() => may('engineer', 'operator', 'op'));
 
-function me_of(answer: Said<Wire<'Me'>>): Me | null {
+function me_of(answer: Unchecked<Wire<'Me'>>): Me | null {
   const o = obj(answer);
   return (
     o && {

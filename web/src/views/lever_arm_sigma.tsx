@@ -28,7 +28,7 @@ export function LeverArmSigma({ withheld, held_m, busy, solve }: Props) {
       {held_m === null ? (
         <p>
           A wrong lever arm would not show in this flight, which withholds {withheld} anchor{withheld === 1 ? '' : 's'}.
-          If the arm was measured with care, say how well; the accuracies then hold it. Said with the flight
+          If the arm was measured with care, say how well; the accuracies then hold it. Unchecked with the flight
           (lever_arm_sigma_m), nobody is asked.
         </p>
       ) : (

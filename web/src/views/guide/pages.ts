@@ -168,7 +168,7 @@ export const PAGES: readonly Page[] = [
         steps: [
           'Drop the folder of the flight (flight.json, track.csv, ranges.csv), its two tables, or either as .zip.',
           'Say what each column is where its name does not: time, position, distance, address of the anchor.',
-          'Name the coordinate system where positions are of a map (EPSG code or zone), and say what heights are above where their column does not.',
+          'Name the coordinate system where positions are of a map (EPSG code or zone), and choose what heights are above where their column does not show it.',
           'Say which point the track is of, and where the antenna of the tag is from there: forward, left, up.',
           'Import: its rows are stored, its anchors are estimated and shown in Anchors.',
         ],

@@ -1,7 +1,7 @@
 /// One place of a campaign, taken in the field: its truth, the rows that are sent, and what they are like so far. No DOM.
 import type { TruthOfRows } from '../../api/campaign';
 import type { Wire } from '../../api/contract';
-import { num, objects, type Said } from '../../live/messages';
+import { num, objects, type Unchecked } from '../../live/messages';
 
 export interface Place {
   readonly campaign: string;
@@ -90,7 +90,7 @@ export function truth_query(p: Place): TruthOfRows {
   return out;
 }
 /// Stored ranges as lines of the import, with everything the radio told.
-export function lines_of(ranges: readonly Said<Wire<'Range'>>[]): string {
+export function lines_of(ranges: readonly Unchecked<Wire<'Range'>>[]): string {
   return objects(ranges)
     .map((r) => {
       const t_us = num(r.t_us),

@@ -61,7 +61,7 @@ export function Mapping({ found, back }: { found: Found; back: () => void }) {
     [ranges, set_ranges] = useState<Table>(found.ranges),
     [tc, set_tc] = useState<Columns>(() => guessed_track(track)),
     [rc, set_rc] = useState<Columns>(() => guessed_ranges(ranges)),
-    [said, set_said] = useState<Partial<Reading>>({}),
+    [given, set_given] = useState<Partial<Reading>>({}),
     [about, set_about] = useState<About>(() => ({
       name: found.name,
       kit: '',
@@ -77,8 +77,8 @@ export function Mapping({ found, back }: { found: Found; back: () => void }) {
     [problem, set_problem] = useState('');
   // A few seconds of work for a flight of hours: only where what it rests on changes.
   const reading = useMemo<Reading>(
-      () => ({ ...guessed_reading(track, tc, ranges, rc, declared), ...said }),
-      [track, tc, ranges, rc, declared, said],
+      () => ({ ...guessed_reading(track, tc, ranges, rc, declared), ...given }),
+      [track, tc, ranges, rc, declared, given],
     ),
     kind = useMemo(() => place_kind(track, tc), [track, tc]),
     above_something = heights_matter(tc, reading.crs),
@@ -186,20 +186,20 @@ export function Mapping({ found, back }: { found: Found; back: () => void }) {
           label="Times of the track"
           of="track-time"
           value={reading.track_time}
-          set={(track_time) => set_said({ ...said, track_time })}
+          set={(track_time) => set_given({ ...given, track_time })}
         />
         <TimeFields
           label="Times of the ranges"
           of="range-time"
           value={reading.range_time}
-          set={(range_time) => set_said({ ...said, range_time })}
+          set={(range_time) => set_given({ ...given, range_time })}
         />
         <Choice
           label="Ranges are in"
           id="range-unit"
           value={reading.range}
           words={LENGTH_UNITS}
-          set={(range) => set_said({ ...said, range })}
+          set={(range) => set_given({ ...given, range })}
         />
         {tc.fix !== undefined && reading.fix !== 'words' && (
           <Choice
@@ -207,7 +207,7 @@ export function Mapping({ found, back }: { found: Found; back: () => void }) {
             id="fix-numbers"
             value={reading.fix}
             words={FIX_NUMBERS}
-            set={(fix) => set_said({ ...said, fix })}
+            set={(fix) => set_given({ ...given, fix })}
           />
         )}
       </div>
@@ -222,7 +222,7 @@ export function Mapping({ found, back }: { found: Found; back: () => void }) {
               data-testid="import-crs"
               onInput={(e) => {
                 const crs = e.currentTarget.value.trim();
-                set_said({ ...said, crs: crs === '' && kind !== 'local' ? null : crs });
+                set_given({ ...given, crs: crs === '' && kind !== 'local' ? null : crs });
               }}
             />
           </label>
@@ -231,7 +231,7 @@ export function Mapping({ found, back }: { found: Found; back: () => void }) {
           <HeightsField
             value={reading.heights}
             has_column={tc.separation !== undefined}
-            set={(heights) => set_said({ ...said, heights })}
+            set={(heights) => set_given({ ...given, heights })}
           />
         )}
         {above_something && (
@@ -240,7 +240,7 @@ export function Mapping({ found, back }: { found: Found; back: () => void }) {
             id="height-unit"
             value={reading.height}
             words={LENGTH_UNITS}
-            set={(height) => set_said({ ...said, height })}
+            set={(height) => set_given({ ...given, height })}
           />
         )}
       </div>
