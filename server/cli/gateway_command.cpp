@@ -9,6 +9,7 @@
 #include "core/base/text.hpp"
 #include "server/cli/commands.hpp"
 #include "server/cli/server_address.hpp"
+#include "server/cli/signals.hpp"
 #include "server/gateway/gateway.hpp"
 #include "server/http/http_client.hpp"
 #include "server/runtime/logging.hpp"
@@ -31,18 +32,6 @@ int fail(const std::string& message, int code) {
   return code;
 }
 
-/// Blocked before any thread starts, so that all inherit it and only sigwait receives them.
-sigset_t block_signals() {
-  sigset_t signals;
-  sigemptyset(&signals);
-  sigaddset(&signals, SIGTERM);
-  sigaddset(&signals, SIGINT);
-  pthread_sigmask(SIG_BLOCK, &signals, nullptr);
-  signal(SIGPIPE, SIG_IGN);
-  signal(SIGXFSZ, SIG_IGN);
-  return signals;
-}
-
 int run(Options& options) {
   auto& g = options.gateway;
   if (g.to.empty())
@@ -57,14 +46,13 @@ int run(Options& options) {
   g.max_bytes = options.max_mib << 20;
   g.max_recording_bytes = options.recordings_max_mib << 20;
   g.version = ANCHORD_VERSION;
-  const auto signals = block_signals();
+  block_signals({SIGTERM, SIGINT});
   umask(077);
   server::start_logging(options.log_level);
   auto started = gateway::FieldGateway::start(g);
   if (!started) return fail(started.error().message, started.error().code == Errc::invalid_argument ? 2 : 1);
   (void)server::notify_service_manager("READY=1");
-  int received = 0;
-  sigwait(&signals, &received);
+  (void)wait_for_signal({SIGTERM, SIGINT});
   (void)server::notify_service_manager("STOPPING=1");
   started.value()->stop();
   server::log(server::LogLevel::info, "stopped");

@@ -9,6 +9,7 @@
 #include "server/cli/commands.hpp"
 #include "server/cli/config_flags.hpp"
 #include "server/cli/doctor.hpp"
+#include "server/cli/signals.hpp"
 #include "server/runtime/logging.hpp"
 #include "server/runtime/service_manager.hpp"
 
@@ -16,16 +17,8 @@ namespace anchord::cli {
 namespace {
 
 int serve(const server::Config& config) {
-  // Blocked before any thread starts, so that all inherit it and only sigwait below hears them.
-  sigset_t signals;
-  sigemptyset(&signals);
-  sigaddset(&signals, SIGTERM);
-  sigaddset(&signals, SIGINT);
-  sigaddset(&signals, SIGHUP);
-  pthread_sigmask(SIG_BLOCK, &signals, nullptr);
-  signal(SIGPIPE, SIG_IGN);
-  signal(SIGXFSZ, SIG_IGN);  // a file size limit is an answer (507), as a full disk is
-  umask(077);                // the database holds tokens and positions
+  block_signals({SIGTERM, SIGINT, SIGHUP});
+  umask(077);  // the database holds tokens and positions
 
   server::start_logging(config.text("log_level"));
   for (const auto& warning : config.warnings) server::log(server::LogLevel::warning, warning);
@@ -44,7 +37,7 @@ int serve(const server::Config& config) {
     server::log(server::LogLevel::warning, "the service manager at NOTIFY_SOCKET was not reached");
   int received = 0;
   for (;;) {
-    sigwait(&signals, &received);
+    received = wait_for_signal({SIGTERM, SIGINT, SIGHUP});
     if (received != SIGHUP) break;
     server::log(server::LogLevel::info, "reloading", {{"signal", "SIGHUP"}});
     app.value()->reload();

@@ -9,6 +9,7 @@
 #include "core/base/guard.hpp"
 #include "core/base/text.hpp"
 #include "server/cli/commands.hpp"
+#include "server/cli/signals.hpp"
 #include "server/runtime/database_worker.hpp"
 #include "server/runtime/logging.hpp"
 #include "server/runtime/service_manager.hpp"
@@ -24,18 +25,11 @@ struct Options {
 };
 
 int run(Options& options) {
-  // Blocked before any thread starts, so that all inherit it and only sigwait receives them.
-  sigset_t signals;
-  sigemptyset(&signals);
-  sigaddset(&signals, SIGTERM);
-  sigaddset(&signals, SIGINT);
-  pthread_sigmask(SIG_BLOCK, &signals, nullptr);
-  signal(SIGPIPE, SIG_IGN);
+  block_signals({SIGTERM, SIGINT});
   server::start_logging(options.log_level);
   static std::atomic<bool> stop{false};  // the thread below may outlive this call
-  Thread("anchord-signal", [signals] {
-    int received = 0;
-    sigwait(&signals, &received);
+  Thread("anchord-signal", [] {
+    (void)wait_for_signal({SIGTERM, SIGINT});
     (void)server::notify_service_manager("STOPPING=1");
     stop = true;
   }).detach();
