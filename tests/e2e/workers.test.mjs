@@ -54,6 +54,15 @@ class Worker {
       }
     });
   }
+  /** Holds its job in the middle, however quick the machine is, until thaw(). */
+  async freeze() {
+    await eventually(`${this.name} computes`, () => this.computing().length > 0, 15_000, 5);
+    [this.frozen] = this.computing();
+    process.kill(Number(this.frozen), 'SIGSTOP');
+  }
+  thaw() {
+    process.kill(Number(this.frozen), 'SIGCONT');
+  }
 }
 async function started(name) {
   const worker = new Worker(name);
@@ -75,6 +84,8 @@ const becomes = (id, what, fits) =>
   );
 const computes = (id, worker) =>
   becomes(id, `is computed by ${worker.name}`, (job) => job.worker === worker.name && job.progress.stage === 'search');
+const taken_over = (id, worker) =>
+  becomes(id, `is taken over by ${worker.name}`, (job) => job.worker === worker.name && job.attempts === 2);
 const succeeds = async (id) => {
   const job = await becomes(id, 'ends', ({ state }) => !['queued', 'running'].includes(state));
   assert.equal(job.state, 'succeeded', JSON.stringify(job));
@@ -166,9 +177,12 @@ test('a worker makes the bytes that the server makes, and the server signs them'
 test('a worker that is killed in the middle is taken over, and there is one result', async () => {
   const one = await started('one');
   const id = await begin(some_seconds);
-  await computes(id, one);
+  await one.freeze();
   const two = await started('two');
   await one.end('SIGKILL');
+  await two.freeze();
+  await taken_over(id, two);
+  two.thaw();
   const job = await succeeds(id);
   assert.deepEqual([job.worker, job.attempts], ['two', 2]);
   assert.equal(await models_of(id), 1);
@@ -181,12 +195,15 @@ test('a worker that is killed in the middle is taken over, and there is one resu
 test('a worker that slept for longer than its lease finds its job taken, and stores nothing', async () => {
   const sleeper = await started('sleeper');
   const id = await begin(some_seconds);
-  await computes(id, sleeper);
+  await sleeper.freeze();
   const other = await started('other');
   sleeper.child.kill('SIGSTOP');
-  await computes(id, other);
+  await other.freeze();
+  await taken_over(id, other);
   sleeper.child.kill('SIGCONT');
+  sleeper.thaw();
   await sleeper.says('job taken over');
+  other.thaw();
   const job = await succeeds(id);
   assert.deepEqual([job.worker, job.attempts], ['other', 2]);
   assert.equal(await models_of(id), 1);
@@ -213,10 +230,11 @@ test('a run is canceled on its worker, whose process ends with it', async () => 
 test('neither a killed server nor a restarted database loses a run', async () => {
   const worker = await started('patient');
   const id = await begin(some_seconds);
-  await computes(id, worker);
+  await worker.freeze();
   await server.kill();
   await postgres.stop();
   await postgres.start();
+  worker.thaw();
   await server.start();
   const job = await succeeds(id);
   assert.equal(job.worker, 'patient');
