@@ -26,10 +26,11 @@ sanitized_tests() {
   export TSAN_OPTIONS=halt_on_error=1:second_deadlock_stack=1
   # The thread sanitizer of g++ 12 ends at once where the kernel spreads addresses wider than it knows.
   if [[ $preset == tsan ]] && setarch "$(uname -m)" -R true 2>/dev/null; then fixed=(setarch "$(uname -m)" -R); fi
-  run_tests "build/$preset" -LE "$left_out_labels" -E "$left_out_names" "$@"
+  rerun=no run_tests "build/$preset" -LE "$left_out_labels" -E "$left_out_names" "$@"
 }
 
-# run_tests FOLDER [ctest arguments...]: of what is built there; ${fixed[@]} of the caller goes before ctest.
+# run_tests FOLDER [ctest arguments...]: of what is built there; ${fixed[@]} of the caller goes before ctest. With rerun=no a failure stands
+# at once: what a sanitizer finds is found, however seldom.
 run_tests() {
   local folder=$1 ; shift
   local log=$folder/test.log junit=$folder/junit.xml second=$folder/junit-alone.xml status=0 jobs alone
@@ -40,7 +41,7 @@ run_tests() {
     --output-junit "$PWD/$junit" "$@" 2>&1 | tee "$log" || status=$?
   [[ -s $junit ]] || die "ctest wrote no results (exit code $status): see $log"
   alone=$(to_run_alone "$junit")
-  if [[ -n $alone ]]; then
+  if [[ -n $alone && ${rerun:-yes} == yes ]]; then
     say "again, each alone: $alone"
     ctest --test-dir "$folder" --output-on-failure -j 1 --output-junit "$PWD/$second" -R "^($alone)\$" 2>&1 | tee -a "$log" || status=$?
     [[ -s $second ]] || die "ctest wrote no results of the tests run alone: see $log"
@@ -73,12 +74,12 @@ verdicts() {
     END { close_case() }' "$1"
 }
 
-# to_run_alone JUNIT: names as a regular expression. Tests of the dashboard work in real time, a browser, an aircraft and a server beside
-# another test on the other core: one to three of them that failed are run once more, alone. Any other failure stands.
+# to_run_alone JUNIT: names as a regular expression. Tests work in real time with ports, disks, a browser, an aircraft, beside another test
+# on the other core: one to three that failed are run once more, alone. More than three stand.
 to_run_alone() {
   verdicts "$1" | awk '
-    $1 == "failed" { names = names (failed++ ? "|" : "") $2; if ($2 !~ /^e2e_/) other = 1 }
-    END { if (!other && failed >= 1 && failed <= 3) print names }'
+    $1 == "failed" { name = $2; gsub(/[^A-Za-z0-9_\/-]/, ".", name); names = names (failed++ ? "|" : "") name }
+    END { if (failed >= 1 && failed <= 3) print names }'
 }
 
 # summarize JUNIT [JUNIT OF THOSE RUN ALONE]: names what did not just pass, then the counts. What passed only alone is named too: it is

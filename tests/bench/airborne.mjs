@@ -1,9 +1,9 @@
 // A simulated aircraft in the air on a server of its own, its operator in control: what benches of flying begin with.
 import { spawn } from 'node:child_process';
-import { createSocket } from 'node:dgram';
 import { writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { hall_outline } from '../e2e/flight.mjs';
+import { free_udp_port } from '../e2e/ports.mjs';
 import { binary, eventually, startServer } from '../e2e/server.mjs';
 
 export const origin = { lon: 3.7131, lat: 51.0231, h_m: 55.5 };
@@ -19,17 +19,9 @@ export const flight_plan = {
   ],
 };
 
-async function free_port() {
-  const socket = createSocket('udp4');
-  await new Promise((done) => socket.bind(0, '127.0.0.1', done));
-  const { port } = socket.address();
-  await new Promise((done) => socket.close(done));
-  return port;
-}
-
 /** {server, mission, base, lease, tokens, must, as, stop} once it flies `plan`; on failure nothing is left behind. */
 export async function airborne(plan = flight_plan) {
-  const port = await free_port();
+  const port = await free_udp_port();
   const server = await startServer({
     auth: 'on',
     args: ['--drone-address', `udp://:${port}`, '--rate-per-s', '100000', '--rate-burst', '100000'],

@@ -3,9 +3,9 @@
 // server killed in the air and started again (hold first), resume, land.
 import assert from 'node:assert/strict';
 import { spawn } from 'node:child_process';
-import { createServer } from 'node:net';
 import { after, before, test } from 'node:test';
 import { hall_outline } from './flight.mjs';
+import { free_tcp_port } from './ports.mjs';
 import { binary, eventually, startServer } from './server.mjs';
 
 let server, aircraft, mission, plan, lease;
@@ -34,10 +34,7 @@ const accepted = async (answer) => {
 };
 
 before(async () => {
-  const socket = createServer();
-  await new Promise((done) => socket.listen(0, '127.0.0.1', done));
-  const { port } = socket.address();
-  await new Promise((done) => socket.close(done));
+  const port = await free_tcp_port();
   server = await startServer({ auth: 'off', args: ['--drone-address', `tcp://127.0.0.1:${port}`] });
   let said = '';
   aircraft = spawn(

@@ -1,9 +1,9 @@
 // The first set-up in the browser, from an empty server: the way to the form, the fields of every kind of device, errors at the field that has
 // them, and what of a typed form is still there after a reload. Real server; no device is at the other end.
 import assert from 'node:assert/strict';
-import { createSocket } from 'node:dgram';
 import { after, before, test } from 'node:test';
 import { openBrowser, openPage, picture, text, violations } from './browser.mjs';
+import { free_udp_port } from './ports.mjs';
 import { eventually, startServer } from './server.mjs';
 
 let browser, server;
@@ -46,13 +46,6 @@ const fields = {
 const of_any = [...new Set(Object.values(fields).flat())];
 
 /** A UDP port that nobody has. */
-async function free_port() {
-  const socket = createSocket('udp4');
-  await new Promise((done) => socket.bind(0, '127.0.0.1', done));
-  const { port } = socket.address();
-  await new Promise((done) => socket.close(done));
-  return String(port);
-}
 async function form(options = {}) {
   const opened = await openPage(browser, server, { hash: '#/system/connect', ...options });
   await opened.id('add-device').click();
@@ -103,7 +96,7 @@ test('what is missing is said before it is sent, what the server rejects stands 
   await lack(/Which port number\?/);
   await id('device-port').fill('70000');
   await lack(/A port number is 1 to 65535/);
-  const port = await free_port();
+  const port = String(await free_udp_port());
   await id('device-port').fill(port);
   await lack(/Mapping: missing/);
   await id('device-mapping').fill('{"tag": "/id",}');

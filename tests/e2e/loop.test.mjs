@@ -211,6 +211,7 @@ test('the plan is changed in the air: shown as a difference on the phone, and fl
     stored = await server.fetch(`/api/v1/plans/${plan}`),
     body = await stored.json();
   body.waypoints.pop();
+  body.settings.target_sigma_m = 0.001; // no anchor is done by itself, however slow the hands of the next test are
   const saved = await server.fetch(`/api/v1/plans/${plan}`, {
     method: 'PUT',
     headers: { 'content-type': 'application/json', 'if-match': stored.headers.get('etag') },
@@ -221,6 +222,7 @@ test('the plan is changed in the air: shown as a difference on the phone, and fl
   await eventually('the difference', async () => (await text(phone.id('plan-lines'))).includes('removed'));
   await confirm(phone, 'plan-take');
   await eventually('revision 2 is flown', async () => (await procedure()).n_waypoints === n - 1);
+  assert.equal((await procedure()).target_sigma_m, 0.001);
   await compare(phone, 'after the change of the plan');
 });
 

@@ -3,24 +3,18 @@
 import assert from 'node:assert/strict';
 import { execFile, spawn } from 'node:child_process';
 import { mkdtempSync, rmSync, writeFileSync } from 'node:fs';
-import { connect, createServer } from 'node:net';
+import { connect } from 'node:net';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { after, before, test } from 'node:test';
 import { promisify } from 'node:util';
 import { ndjson, simulatedFlight } from './flight.mjs';
+import { free_tcp_port } from './ports.mjs';
 import { eventually, run, startServer } from './server.mjs';
 
 const folder = mkdtempSync(join(tmpdir(), 'anchord mqtt '));
 let server, broker, port, anchors;
 
-const freePort = () =>
-  new Promise((done) => {
-    const probe = createServer().listen(0, '127.0.0.1', () => {
-      const { port: free } = probe.address();
-      probe.close(() => done(free));
-    });
-  });
 function startBroker() {
   const file = join(folder, 'mosquitto.conf');
   writeFileSync(file, `listener ${port} 127.0.0.1\nallow_anonymous true\npersistence false\n`);
@@ -52,7 +46,7 @@ const post = async (path, json, headers) => {
 const system = async () => (await (await server.fetch('/api/v1/system')).json()).mqtt;
 
 before(async () => {
-  port = await freePort();
+  port = await free_tcp_port();
   startBroker();
   server = await startServer({ args: ['--mqtt-host=127.0.0.1', `--mqtt-port=${port}`] });
   const flight = await simulatedFlight({ duration: 60 });
@@ -113,7 +107,7 @@ test('tags of other makers measure by a mapping from a TOML file: over the broke
     return made.stdout.trim();
   };
   const device = async (id) => (await server.fetch(`/api/v1/devices/${id}`)).json();
-  const tag_port = await freePort();
+  const tag_port = await free_tcp_port();
   const mqtt = await add('mqtt', `tcp://127.0.0.1:${port}`, ['topic = "uwb/+"', ...values]);
   const line = await add('ndjson', `tcp-listen://127.0.0.1:${tag_port}`, values);
   const body = { name: 'other makers', frame: 'wgs84', track_point: 'tag_antenna' };

@@ -1,20 +1,13 @@
 // A PostgreSQL of the test's own: its folder, a port that the system chose, passwords asked for, and its end by process id.
 import { execFileSync, spawn } from 'node:child_process';
 import { chmodSync, chownSync, mkdirSync, mkdtempSync, rmSync, writeFileSync } from 'node:fs';
-import { connect, createServer } from 'node:net';
+import { connect } from 'node:net';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
+import { free_tcp_port } from './ports.mjs';
 import { eventually } from './server.mjs';
 
 const programs = '/usr/lib/postgresql/15/bin';
-
-const freePort = () =>
-  new Promise((done) => {
-    const probe = createServer().listen(0, '127.0.0.1', () => {
-      const { port } = probe.address();
-      probe.close(() => done(port));
-    });
-  });
 
 /** It refuses to be root: then it is the user that Debian's package made. */
 function ordinaryUser() {
@@ -72,7 +65,7 @@ export class Postgres {
       cwd: '/',
       stdio: 'pipe',
     });
-    this.port = await freePort();
+    this.port = await free_tcp_port();
     return this.start();
   }
 

@@ -2,11 +2,11 @@
 import assert from 'node:assert/strict';
 import { execFile, spawn } from 'node:child_process';
 import { mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
-import { createServer } from 'node:net';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { after, before, test } from 'node:test';
 import WebSocket from 'ws';
+import { free_tcp_port } from './ports.mjs';
 import { eventually, root, run, startServer } from './server.mjs';
 
 const folder = mkdtempSync(join(tmpdir(), 'anchord-proxies-'));
@@ -22,13 +22,6 @@ function changed(text, ...pairs) {
   }
   return text;
 }
-const free_port = () =>
-  new Promise((done) => {
-    const socket = createServer().listen(0, '127.0.0.1', () => {
-      const { port } = socket.address();
-      socket.close(() => done(port));
-    });
-  });
 
 before(async () => {
   const made = await run(['tls', 'init', '--dir', folder, '--name', 'anchord.example']);
@@ -140,7 +133,7 @@ async function everything(url, curl, port) {
 }
 
 test('nginx with the sample of the documentation', async () => {
-  const port = await free_port();
+  const port = await free_tcp_port();
   const site = changed(
     sample('nginx.conf'),
     ['listen 443 ssl', `listen 127.0.0.1:${port} ssl`],
@@ -160,7 +153,7 @@ test('nginx with the sample of the documentation', async () => {
 });
 
 test('Caddy with the sample of the documentation', async () => {
-  const port = await free_port();
+  const port = await free_tcp_port();
   const site = changed(
     sample('Caddyfile'),
     [

@@ -1,16 +1,13 @@
 // A server with the simulated aircraft at the other end of MAVLink, its tag and rover through REST; and its flight, started by another client.
 import assert from 'node:assert/strict';
 import { spawn } from 'node:child_process';
-import { createSocket } from 'node:dgram';
 import { hall_outline } from './flight.mjs';
+import { free_udp_port } from './ports.mjs';
 import { binary, eventually, startServer } from './server.mjs';
 
 /** The server, the mission that the aircraft made, and how the aircraft ends. */
 export async function serverWithAircraft() {
-  const socket = createSocket('udp4');
-  await new Promise((done) => socket.bind(0, '127.0.0.1', done));
-  const { port } = socket.address();
-  await new Promise((done) => socket.close(done));
+  const port = await free_udp_port();
   const server = await startServer({ auth: 'off', args: ['--drone-address', `udp://:${port}`] });
   let said = '';
   const aircraft = spawn(

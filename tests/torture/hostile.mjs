@@ -10,6 +10,7 @@ import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { after, before, test } from 'node:test';
 import { hall_outline, ndjson } from '../e2e/flight.mjs';
+import { free_udp_port } from '../e2e/ports.mjs';
 import { binary, eventually, startServer } from '../e2e/server.mjs';
 
 const FAKETIME = ['x86_64', 'aarch64']
@@ -107,13 +108,6 @@ function percentiles(list) {
   const at = (p) => sorted[Math.min(sorted.length - 1, Math.floor(p * sorted.length))]?.toFixed(1);
   return `${sorted.length} answers, p50 ${at(0.5)} ms, p90 ${at(0.9)} ms, p99 ${at(0.99)} ms, worst ${at(1)} ms`;
 }
-async function freeUdpPort() {
-  const socket = createSocket('udp4');
-  await new Promise((done) => socket.bind(0, '127.0.0.1', done));
-  const { port } = socket.address();
-  await new Promise((done) => socket.close(done));
-  return port;
-}
 async function listen(onConnection) {
   const tcp = createServer((socket) => {
     socket.on('error', () => {});
@@ -138,7 +132,7 @@ before(async () => {
     FAKETIME_CACHE_DURATION: '1',
     FAKETIME_DONT_FAKE_MONOTONIC: '1',
   };
-  const mavlink = await freeUdpPort();
+  const mavlink = await free_udp_port();
   server = await startServer({ auth: 'on', args: ['--drone-address', `udp://:${mavlink}`], env });
   tokens.admin = server.token;
   for (const [name, role] of [

@@ -9,6 +9,7 @@
 #include "drivers/device/device_loop.hpp"
 #include "drivers/sim/rig.hpp"
 #include "tests/drivers/sim/program.hpp"
+#include "tests/ports.hpp"
 
 namespace anchord::sim {
 namespace {
@@ -31,7 +32,7 @@ TEST(RealGpsd, BetweenTheSimulatedRoverAndOurDriverKeepsPositionFixClassAndHeigh
   scenario.rovers[0].rate_hz = 5;
   auto rig = Rig::open(std::make_shared<const Scenario>(scenario), {});
   ASSERT_TRUE(rig) << rig.error().message;
-  const int port = test::free_port();
+  const int port = anchord::test::free_tcp_port();
   // Read-only (-b), without waiting for a client (-n), in the foreground (-N), on loopback.
   test::Program gpsd({k_gpsd, "-N", "-n", "-b", "-S", std::to_string(port),
                       "tcp://127.0.0.1:" + std::to_string(rig.value()->devices().at(0).tcp_port)});

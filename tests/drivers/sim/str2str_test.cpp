@@ -15,6 +15,7 @@
 #include "drivers/sim/ports.hpp"
 #include "drivers/sim/rig.hpp"
 #include "tests/drivers/sim/program.hpp"
+#include "tests/ports.hpp"
 
 namespace anchord::sim {
 namespace {
@@ -133,7 +134,7 @@ TEST_F(Str2str, AsACasterGivesCorrectionsThatReachTheRoverWhole) {
   ASSERT_TRUE(receiver->up());
   const std::string password = folder_ / "password";
   std::ofstream(password) << "secret\n";
-  const std::string caster = std::to_string(test::free_port());
+  const std::string caster = std::to_string(anchord::test::free_tcp_port());
   test::Program casting({k_str2str, "-in", "tcpcli://127.0.0.1:" + std::to_string(base->port()), "-out",
                          "ntripc://me:secret@:" + caster + "/BASE", "-r", "200"});
   ASSERT_TRUE(loop_.add({"rover", "gnss", "rover", "tcp://127.0.0.1:" + std::to_string(receiver->port()),

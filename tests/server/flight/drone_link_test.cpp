@@ -20,6 +20,7 @@
 
 #include "drivers/sim/autopilot.hpp"
 #include "drivers/sim/ports.hpp"
+#include "tests/ports.hpp"
 
 namespace anchord::flight {
 namespace {
@@ -195,7 +196,7 @@ class Sender {
   std::uint8_t number_{0};
 };
 
-std::uint16_t free_port() {
+std::uint16_t free_udp_port() {
   const int probe = ::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
   sockaddr_in at{};
   at.sin_family = AF_INET;
@@ -219,7 +220,7 @@ bool somebody_listens_at(std::uint16_t port) {
 }
 
 TEST(DroneLink, ADatagramOfAStrangerTakesNothingOverUdp) {
-  const auto port = free_port();
+  const auto port = free_udp_port();
   auto opened = DroneLink::open("udp://:" + std::to_string(port), {});
   ASSERT_TRUE(opened) << opened.error().message;
   auto& link = *opened.value();
@@ -241,7 +242,7 @@ TEST(DroneLink, ADatagramOfAStrangerTakesNothingOverUdp) {
 
 /// The newest connection took the link, and with it the aircraft in the air.
 TEST(DroneLink, AStrangerWhoConnectsToItsTcpPortTakesNothingAndTheAircraftMayComeBackAtOnce) {
-  const auto port = free_port();
+  const auto port = test::free_tcp_port();
   auto opened = DroneLink::open("tcp-listen://127.0.0.1:" + std::to_string(port), {});
   ASSERT_TRUE(opened) << opened.error().message;
   auto& link = *opened.value();
@@ -267,7 +268,7 @@ TEST(DroneLink, AStrangerWhoConnectsToItsTcpPortTakesNothingAndTheAircraftMayCom
 }
 
 TEST(DroneLink, AStrangerWhoIsHeardFirstDoesNotTakeAFlightThatGoesOn) {
-  const auto port = free_port();
+  const auto port = free_udp_port();
   Sender aircraft(port, 1), stranger(port, 66);
   auto opened = DroneLink::open("udp://:" + std::to_string(port), {});
   ASSERT_TRUE(opened) << opened.error().message;
@@ -285,7 +286,7 @@ TEST(DroneLink, AStrangerWhoIsHeardFirstDoesNotTakeAFlightThatGoesOn) {
 // thread that another's frame overtakes on its way out is lost, and comes only when it is repeated.
 TEST(DroneLink, FramesLeaveInTheOrderOfTheirNumbersWhoeverCommands) {
   constexpr int k_threads = 3, k_rounds = 20, k_commands = 200;
-  const auto port = free_port();
+  const auto port = free_udp_port();
   auto opened = DroneLink::open("udp://:" + std::to_string(port), {});
   ASSERT_TRUE(opened) << opened.error().message;
   auto& link = *opened.value();
