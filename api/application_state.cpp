@@ -67,6 +67,7 @@ Application::State::State(Deps d)
                .late = late,
                .drone = deps.drone,
                .storage = deps.storage_status,
+               .ended = [this](const std::string& token_id) { return deps.access.ended(token_id); },
                .now_s = deps.flight_clock}),
       stream({deps.devices, stores.service, stores.missions, events}),
       housekeeping({stores.bin, running, events, [this] { return router.purge_answers(); },

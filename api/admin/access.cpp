@@ -73,14 +73,18 @@ struct Admitted {
     return end == ends.end() || now < end->second;
   }
 
+  static std::string key_of(std::string_view token_id) {
+    std::string key(token_id);
+    std::erase(key, '-');
+    return key;
+  }
+
   bool holds(const Login& login, SteadyTime now) const {
     if (!login.session_sha256.empty()) {
       const auto session = sessions.find(login.session_sha256);
       if (session == sessions.end() || session->second.until <= now) return false;
     }
-    std::string key = login.who.token_id;
-    std::erase(key, '-');
-    const auto token = tokens.find(key);
+    const auto token = tokens.find(key_of(login.who.token_id));
     return token != tokens.end() && live(token->first, token->second, now) &&
            principal_of(token->second).roles == login.who.roles;
   }
@@ -296,6 +300,13 @@ bool AccessService::holds(const Login& login) const {
   const SteadyTime now = state_->steady_now();
   const auto admitted = state_->admitted.lock_shared();
   return admitted->holds(login, now);
+}
+
+bool AccessService::ended(std::string_view token_id) const {
+  const SteadyTime now = state_->steady_now();
+  const auto admitted = state_->admitted.lock_shared();
+  const auto token = admitted->tokens.find(Admitted::key_of(token_id));
+  return token != admitted->tokens.end() && !admitted->live(token->first, token->second, now);
 }
 
 LoginGuard& AccessService::guard() { return state_->guard; }

@@ -79,6 +79,8 @@ class AccessService {
   /// Does it still open what it opened? False once its token was revoked or has expired, its roles are
   /// others, or its session has ended. Never waits: for every tick of every stream.
   bool holds(const Login& login) const;
+  /// Was this token revoked, or has it expired? False for one that is not known. Never waits.
+  bool ended(std::string_view token_id) const;
 
   std::string make_ticket(Login login);
   /// The login the ticket was made for, once, and only while that holds.

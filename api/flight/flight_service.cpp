@@ -118,10 +118,13 @@ void FlightService::step() {
   // The estimates belong to the mission's strand, whose observer asks for our lock: never ask for both. Nor
   // is that strand waited for: safety is looked after here, whatever the estimator does.
   std::optional<MissionId> mission;
+  std::optional<Lease> held;
   {
     const auto w = s.work.lock();
     mission = flight::wants_estimates(w->operations);
+    held = w->operations.control(s.now());
   }
+  const bool ended = held && s.deps.ended(held->token_id);
   std::optional<MissionService::LiveView> live;
   if (mission) live = s.deps.missions.live_at_hand(*mission);
   std::optional<flight::Operations::Estimates> estimates;
@@ -136,6 +139,7 @@ void FlightService::step() {
       s.checks_apart.note(now.s);
     else
       s.checks_apart.pause();
+    if (ended) w->operations.end_control(now, held->token_id);
     w->operations.round(now, estimates, live.has_value());
     if (auto task = w->operations.take_point_task()) w->apart.point = std::move(task);
     if (const auto& f = w->operations.flight()) {

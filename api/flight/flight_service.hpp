@@ -59,6 +59,7 @@ class FlightService final : public MissionObserver, public MissionControl {
     LateWriter& late;
     Drone* drone{nullptr};  ///< null: flown by hand ("manual")
     std::function<StorageStatus()> storage;
+    std::function<bool(const std::string& token_id)> ended;  ///< revoked or expired
     std::function<double()> now_s{};  ///< steady seconds; set: no thread, the owner calls step()
   };
   explicit FlightService(Deps deps);

@@ -31,7 +31,8 @@ struct Subscription {
 class Outbox {
  public:
   static constexpr std::size_t k_max_bytes = 1u << 20, k_max_messages = 512;
-  static constexpr std::int64_t k_delta_bytes_per_s = 30'000;
+  /// With the frame that a window of some 20 s begins with, 30 kB/s.
+  static constexpr std::int64_t k_delta_bytes_per_s = 27'000;
 
   explicit Outbox(HubCounters& counters) : counters_(counters) {}
 

@@ -169,6 +169,8 @@ class Operations {
   }
   Result<void> release_control(const Now& now, const MissionId& mission, const std::string& key,
                                const Holder& who);
+  /// Of a token that opens nothing any more.
+  void end_control(const Now& now, const std::string& token_id);
   std::optional<Lease> control(const Now& now) const { return lease_.holder(now); }
   Result<FlightCommand> begin(const Now& now, const Mission& mission, const Groundwork& ground, bool manual,
                               const std::string& who);

@@ -67,6 +67,15 @@ Result<void> Operations::release_control(const Now& now, const MissionId& missio
   return boost::outcome_v2::success();
 }
 
+void Operations::end_control(const Now& now, const std::string& token_id) {
+  const auto held = lease_.holder(now);
+  if (!held || held->token_id != token_id) return;
+  (void)lease_.release(held->mission, held->key, {held->token_id, held->name}, now);
+  log_event(flying() ? EventLevel::warning : EventLevel::info, "control.ended",
+            "control ended: the token of " + held->name + " was revoked or has expired", held->mission);
+  show_soon_ = true;
+}
+
 std::vector<ChecklistItem> Operations::checklist(const Now& now, const Mission* record,
                                                  const MissionId& mission, const Groundwork& ground,
                                                  bool manual) const {

@@ -409,6 +409,28 @@ TEST_F(Flights, AskingForControlReachesItsHolderAndTakesNothing) {
   EXPECT_EQ(std::ranges::count(codes, "control.refused"), 1);
 }
 
+TEST_F(Flights, ControlEndsWithItsToken) {
+  const auto lease = take_off();
+  const auto made =
+      access_->create_token("second crew", {"operator"}, std::nullopt, {"tester", "tester", {}}, "");
+  ASSERT_TRUE(made);
+  Call crew;
+  crew.token = to_string(made.value().token.id);
+  crew.roles = {api::Role::op};
+  ASSERT_EQ(call(api::Method::post, base() + "/control", R"({"action":"take","force":true})", crew).status,
+            200);
+  fly(1);
+  EXPECT_EQ(post(base() + "/control", R"({"action":"take"})").status, 409) << "its token lives";
+  ASSERT_TRUE(access_->revoke_token(made.value().token.id, {"tester", "tester", {}}, ""));
+  fly(0.5);
+  EXPECT_EQ(json(get(base() + "/control"))["held"], false);
+  EXPECT_EQ(post(base() + "/control", R"({"action":"take"})").status, 200) << "without force";
+  EXPECT_EQ(procedure()["status"], "running");
+  const Json events = json(get(base() + "/events", {{"limit", "100"}}));
+  EXPECT_EQ(
+      std::ranges::count_if(events["items"], [](const Json& e) { return e["code"] == "control.ended"; }), 1);
+}
+
 TEST_F(Flights, OnlyOneHasControl) {
   const auto lease = take_off();
   EXPECT_EQ(post(base() + "/control", R"({"action":"take"})").status, 409);
