@@ -91,7 +91,7 @@ std::string picture_of(const Request& request) {
   const auto too_large = [] {
     throw_problem(413, "too-large",
                   "the plan is larger than " + std::to_string(floor_plan::k_max_image_bytes >> 20) +
-                      " MiB: scale it down, or send one floor alone");
+                      " MiB: scale it down, or send a single floor");
   };
   std::string out;
   if (request.body_stream == nullptr) {

@@ -56,7 +56,8 @@ Result<Pairs> read_pairs(const std::filesystem::path& file) {
       BOOST_OUTCOME_TRY(pair.local_m[static_cast<Eigen::Index>(i)], table.number(local[i]));
       BOOST_OUTCOME_TRY(at[static_cast<Eigen::Index>(i)], table.number(there[i]));
     }
-    if (!at.allFinite() || (globe && std::abs(at.y()) > 90)) return table.error("no place on the globe");
+    if (!at.allFinite() || (globe && std::abs(at.y()) > 90))
+      return table.error("not a position on the globe");
     if (globe) {
       const Wgs84 place{at.y(), at.x(), at.z()};
       if (!out.origin) out.origin = place;

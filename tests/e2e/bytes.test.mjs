@@ -224,7 +224,7 @@ test('an aircraft whose texts hold 0x80 to 0xff is flown, and its text is UTF-8'
   }
   const started = await eventually('the flight begins', async () => {
     const answer = await post(`/api/v1/missions/${mission}/actions`, { action: 'start', plan, lease });
-    return answer.status === 202 || !/not known where/.test(answer.json.detail) ? answer : null;
+    return answer.status === 202 || !/position is not known/.test(answer.json.detail) ? answer : null;
   });
   assert.equal(started.status, 202, JSON.stringify(started.json));
   const { drone } = await eventually('its text', async () => {
