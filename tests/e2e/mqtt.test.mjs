@@ -158,7 +158,7 @@ test('tags of other makers measure by a mapping from a TOML file: over the broke
     'mapping={"tag":"id"}',
   ]);
   assert.equal(wrong.code, 1);
-  assert.match(wrong.stderr, /mapping\/tag: "id" is no JSON pointer/);
+  assert.match(wrong.stderr, /mapping\/tag: "id" is not a JSON pointer/);
 });
 
 test('a broker that is away is seen in /system, on /metrics and as an alarm, and gets everything when it is back', async () => {

@@ -219,7 +219,7 @@ describe('the settings of a tag of another maker', () => {
     expect(missing({ ...BROKER, payload: 'pozyx', topic: '', mapping: '' })).toBe('');
   });
   it('is refused with a password and no user, and without the id that binary needs', () => {
-    expect(missing({ ...BROKER, password: 'secret' })).toMatch(/^User: missing, and a password needs one/);
+    expect(missing({ ...BROKER, password: 'secret' })).toMatch(/^User: missing, and a password needs a user/);
     expect(missing({ ...MODULE, mode: 'tlv' })).toMatch(/^Id of the tag: missing, and binary needs it/);
     for (const tag of ['6e01', '0x', '0x100000000', '-1'])
       expect(missing({ ...MODULE, tag })).toBe(`Id of the tag: ${tag} is no id. Type 32 bits at most, like 0x6e01.`);
@@ -240,10 +240,10 @@ describe('what the server rejects', () => {
   const refused = (pointer: string, detail: string): ApiError =>
     new ApiError(problem_of({ title: 'Validation', detail, errors: [{ pointer, detail }] }, 422));
   it('is of the field that it names, every fault of a mapping by itself', () => {
-    const text = 'mapping/tag: is needed, like "/tag"; mapping/x: there is no such key; there are topic, array';
+    const text = 'mapping/tag: is needed, like "/tag"; mapping/x: there is no such key; the keys are topic, array';
     expect(rejected_of(refused('/options', text), 'ndjson')).toEqual({
       field: 'mapping',
-      faults: ['mapping/tag: is needed, like "/tag"', 'mapping/x: there is no such key; there are topic, array'],
+      faults: ['mapping/tag: is needed, like "/tag"', 'mapping/x: there is no such key; the keys are topic, array'],
     });
     expect(rejected_of(refused('/options', 'tag: an id like 0x022e'), 'dwm1001')?.field).toBe('tag');
     expect(rejected_of(refused('/options/password', 'must be a text'), 'mqtt')).toEqual({

@@ -33,7 +33,9 @@ describe('the next point', () => {
     expect(grid_measure(g({ rule: 'a_optimal' }))).toBe('Expected error, rms');
   });
   it('is chosen only where the aircraft goes there', () => {
-    expect(grid_outcome({ chosen: 3, outcome: 'done_here: the best point would improve the result by only 1 %' })).toMatchObject({
+    expect(
+      grid_outcome({ chosen: 3, outcome: 'done_here: the best point would improve the result by only 1 %' }),
+    ).toMatchObject({
       word: 'ENOUGH HERE',
       why: 'the best point would improve the result by only 1 %',
       flown: false,

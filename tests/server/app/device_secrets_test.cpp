@@ -250,7 +250,7 @@ TEST(DeviceAddresses, OpenNothingThatIsNoTerminalLine) {
     do {
       shown = server.call("GET", made.headers.at("location"), {}, pilot).body;
     } while (Json::parse(shown)["reason"].is_null() && std::chrono::steady_clock::now() < end);
-    EXPECT_NE(shown.find("this is no serial port"), std::string::npos) << address << " " << shown;
+    EXPECT_NE(shown.find("this is not a serial port"), std::string::npos) << address << " " << shown;
   }
 }
 
