@@ -20,7 +20,7 @@ constexpr std::string_view k_omlox_path = "/omlox/v2/ws/socket";
 constexpr WsPlaceLimits k_strangers{8, 4, 0};
 constexpr std::string_view k_subprotocol = "anchord.v1";
 /// In the audit log.
-constexpr std::string_view k_unknown_token = "a token that is not known, expired or revoked";
+constexpr std::string_view k_unknown_token = "a token that is unknown, expired or revoked";
 
 bool unsafe(api::Method method) {
   return method != api::Method::get && method != api::Method::head && method != api::Method::options;
@@ -107,7 +107,7 @@ std::optional<api::Response> Authenticator::identify(api::Request& request, bool
     const auto who = access_.verify(secret);
     if (!who) {
       access_.note_refusal("nobody", k_unknown_token, request.remote);
-      return wrong_secret(request, secret, "the token is not known, expired or revoked");
+      return wrong_secret(request, secret, "the token is unknown, expired or revoked");
     }
     request.principal = *who;
     login = {*who, {}};

@@ -198,7 +198,7 @@ Result<std::optional<Cursor>> parse_cursor(const std::string& text) {
     const auto id = std::from_chars(time.ptr + 1, end, cursor.id);
     if (id.ec == std::errc{} && id.ptr == end) return std::optional(cursor);
   }
-  return make_error(Errc::invalid_argument, "not a cursor of ours: \"" + text + "\"");
+  return make_error(Errc::invalid_argument, "not a cursor of this server: \"" + text + "\"");
 }
 
 constexpr LimitColumns k_range_limits{"distance_m", "ifnull(rx_dbm, rss_dbm)", "truth_los"};

@@ -246,9 +246,9 @@ describe('what the server rejects', () => {
       faults: ['mapping/tag: is needed, like "/tag"', 'mapping/x: there is no such key; the keys are topic, array'],
     });
     expect(rejected_of(refused('/options', 'tag: an id like 0x022e'), 'dwm1001')?.field).toBe('tag');
-    expect(rejected_of(refused('/options/password', 'must be a text'), 'mqtt')).toEqual({
+    expect(rejected_of(refused('/options/password', 'must be a string'), 'mqtt')).toEqual({
       field: 'password',
-      faults: ['password: must be a text'],
+      faults: ['password: must be a string'],
     });
   });
   it('is of the whole form where it names no field of it', () => {

@@ -58,7 +58,7 @@ cli::TopDocuments empty_server() {
                         .dump();
   out.alarms.body = out.devices.body = out.missions.body = out.jobs.body = list({});
   out.metrics.body =
-      "# HELP anchord_live_queue_rows Rows that wait for the live estimates\n"
+      "# HELP anchord_live_queue_rows Rows that are waiting for the live estimates\n"
       "# TYPE anchord_live_queue_rows gauge\n"
       "anchord_live_queue_rows 2\n"
       "anchord_command_queue 0\n"
