@@ -226,7 +226,7 @@ Response Router::dispatch(const Route& route, Request& request) const {
   const auto answer = [&] {
     if (!route.access.permits(request.principal)) {
       if (request.principal.roles.empty()) {
-        response = problem(401, "unauthorized", "send a token as Authorization: Bearer");
+        response = problem(401, "unauthorized", "send a token in the header Authorization: Bearer");
       } else {
         std::string needed;
         for (const Role role : route.access.roles())

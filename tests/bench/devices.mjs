@@ -178,7 +178,7 @@ async function play(recorded, tags, rate) {
     const took = (performance.now() - start) / 1000,
       server_cpu = cpuSeconds(server.pid) - before;
     if (code !== 0) throw new Error(`replay ended with ${code}: ${said}`);
-    const [accepted, known, refused] = /(\d+) rows accepted, (\d+) known already, (\d+) refused/
+    const [accepted, known, refused] = /(\d+) rows accepted, (\d+) duplicates, (\d+) rejected/
       .exec(said)
       .slice(1)
       .map(Number);

@@ -365,9 +365,9 @@ test('what is kept of devices never keeps the server from starting: it says whic
   );
   for (const [i, why] of [
     [1, /no driver for "lidar"/],
-    [2, /format: one of/],
-    [3, /address: not a text/],
-    [5, /no object/],
+    [2, /format: must be one of/],
+    [3, /address: not a string/],
+    [5, /not an object/],
   ]) {
     assert.equal(devices[i].state, 'off');
     assert.match(devices[i].reason, /^not started: .*; correct its settings or remove it$/);

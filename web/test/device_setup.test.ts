@@ -245,7 +245,7 @@ describe('what the server rejects', () => {
       field: 'mapping',
       faults: ['mapping/tag: is needed, like "/tag"', 'mapping/x: there is no such key; the keys are topic, array'],
     });
-    expect(rejected_of(refused('/options', 'tag: an id like 0x022e'), 'dwm1001')?.field).toBe('tag');
+    expect(rejected_of(refused('/options', 'tag: must be an id like 0x022e'), 'dwm1001')?.field).toBe('tag');
     expect(rejected_of(refused('/options/password', 'must be a string'), 'mqtt')).toEqual({
       field: 'password',
       faults: ['password: must be a string'],
@@ -254,7 +254,7 @@ describe('what the server rejects', () => {
   it('is of the whole form where it names no field of it', () => {
     expect(rejected_of(refused('/address', 'tag: the host is missing'), 'mqtt')).toBeNull();
     expect(rejected_of(refused('/options', 'must be an object below 10 kB'), 'mqtt')).toBeNull();
-    expect(rejected_of(refused('/options', 'mount: the name of a mount point'), 'ntrip')).toBeNull();
+    expect(rejected_of(refused('/options', 'mount: must be the name of a mount point'), 'ntrip')).toBeNull();
     expect(rejected_of(new Error('no answer'), 'mqtt')).toBeNull();
   });
 });

@@ -169,9 +169,9 @@ TEST(Dwm1001, NamesTheOptionThatIsWrong) {
     return done ? "" : done.error().message;
   };
   EXPECT_EQ(why("{}"), "");
-  EXPECT_EQ(why(R"({"mode":"spi"})"), "mode: one of shell, tlv");
+  EXPECT_EQ(why(R"({"mode":"spi"})"), "mode: must be one of shell, tlv");
   EXPECT_EQ(why(R"({"mode":"tlv"})"), "tag: is needed in binary mode: give an id like 0x022e");
-  EXPECT_EQ(why(R"({"tag":7})"), "tag: an id like 0x022e");
+  EXPECT_EQ(why(R"({"tag":7})"), "tag: must be an id like 0x022e");
   EXPECT_EQ(why(R"({"baud":7})"), "baud: no such option: a dwm1001 device has mode, tag");
 }
 

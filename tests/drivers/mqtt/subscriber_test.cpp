@@ -163,7 +163,7 @@ TEST(MqttSubscriber, NamesTheOptionThatIsWrong) {
   EXPECT_EQ(why(k_ranges), "");
   EXPECT_EQ(why(R"({"format":"pozyx"})"), "");
   EXPECT_EQ(why("{}"), "mapping: is needed: an object that gives the place of each value");
-  EXPECT_EQ(why(R"({"format":"omlox"})"), "format: one of mapping, pozyx");
+  EXPECT_EQ(why(R"({"format":"omlox"})"), "format: must be one of mapping, pozyx");
   EXPECT_EQ(why(R"({"format":"pozyx","topic":"a#"})"), "topic: '#' must be the whole last level");
   EXPECT_EQ(why(R"({"qos":1})"),
             "qos: no such option: an mqtt device has format, mapping, topic, user, password");
