@@ -291,7 +291,7 @@ export const moved_since_published = async (calibration: string): Promise<Map<st
 export const report_url = (calibration: string): string =>
   url('/calibrations/{id}/report', { path: { id: calibration } });
 
-/// One published position of an anchor, and how far it is from the one before; null where either has not a position on the globe.
+/// One published position of an anchor, and how far it is from the one before; null where either has no place on the globe.
 export interface Past {
   readonly revision: number;
   readonly published_at: string;
