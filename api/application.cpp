@@ -37,11 +37,11 @@ TokenWsFactory Application::omlox_ws_factory() {
 void Application::start() {
   if (std::exchange(state_->started, true)) return;
   // Whatever is kept, the server starts: what cannot be taken up again is told.
-  (void)guarded("models and events at the start", [this] {
+  (void)guarded("models and events at start", [this] {
     if (state_->deps.model_key_is_new) {
       if (const auto n = sign_kept_models(state_->stores.models, state_->signer); n > 0)
         state_->events.add(EventLevel::info, "model.signed",
-                           std::to_string(n) + " models of before are signed with this server's new key " +
+                           std::to_string(n) + " older models are signed with this server's new key " +
                                state_->signer.key_id());
     }
     const auto loaded = state_->models.reload();
@@ -54,9 +54,9 @@ void Application::start() {
     else
       state_->deps.log_fault("", before.error().message);
   });
-  (void)guarded("missions at the start", [this] { state_->missions.resume(); });
-  (void)guarded("devices of the flight at the start", [this] { state_->stream.resume(); });
-  (void)guarded("webhooks at the start", [this] { state_->webhooks.changed(); });
+  (void)guarded("missions at start", [this] { state_->missions.resume(); });
+  (void)guarded("devices of the flight at start", [this] { state_->stream.resume(); });
+  (void)guarded("webhooks at start", [this] { state_->webhooks.changed(); });
   if (state_->deps.broker != nullptr) state_->deps.broker->start(state_->publisher);
   state_->flights.start();
   state_->jobs.start();

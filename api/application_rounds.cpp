@@ -42,7 +42,7 @@ void Application::State::calibrate_landed() {
     request.settings_json = R"({"after_landing":true})";
     if (const auto job = calibrations.submit(std::move(request)); job)
       events.add(EventLevel::info, "calibration.after_landing",
-                 "landed: all ranges are solved again, together; the result waits for review", id);
+                 "landed: all ranges are being solved together; the result waits for review", id);
     else
       events.add(EventLevel::warning, "calibration.not_started",
                  "not calibrated after landing: " + job.error().message, id);

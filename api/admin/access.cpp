@@ -169,13 +169,13 @@ Result<NewToken> AccessService::create_token(std::string_view name, const std::v
                                              std::optional<UtcTime> expires, const Principal& by,
                                              std::string_view from) {
   if (name.empty() || name.size() > 100)
-    return make_error(Errc::invalid_argument, "a name has 1 to 100 characters");
+    return make_error(Errc::invalid_argument, "the name must have 1 to 100 characters");
   if (roles.empty()) return make_error(Errc::invalid_argument, "a token needs at least one role");
   for (const auto& word : roles) {
     BOOST_OUTCOME_TRYV(k_role_words.parse("role", word));
   }
   const UtcTime now = state_->clock.now();
-  if (expires && *expires <= now) return make_error(Errc::invalid_argument, "the expiry lies in the past");
+  if (expires && *expires <= now) return make_error(Errc::invalid_argument, "the expiry is in the past");
   const std::string secret = random_hex_256();
   NewToken made;
   made.token.id = TokenId{make_uuid_v7(now)};
@@ -256,7 +256,7 @@ Result<std::string> AccessService::open_session(std::string_view token_text, std
     }
   }
   audit(who.empty() ? "nobody" : who, "login", from, who.empty() ? "refused" : "done");
-  if (who.empty()) return make_error(Errc::invalid_argument, "this token is not known, expired or revoked");
+  if (who.empty()) return make_error(Errc::invalid_argument, "this token is unknown, expired or revoked");
   return cookie;
 }
 

@@ -34,7 +34,7 @@ std::string text_field(const json& body, const char* key, std::vector<FieldError
     return {};
   }
   if (!at->is_string()) {
-    faults.push_back({std::string("/") + key, "type", "must be a text"});
+    faults.push_back({std::string("/") + key, "type", "must be a string"});
     return {};
   }
   return at->get<std::string>();

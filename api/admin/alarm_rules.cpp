@@ -32,14 +32,14 @@ void rtk(const FlightPulse& f, std::vector<AlarmCondition>& out) {
   if (f.newest_fix && fixes_s > k_lost_s && (behind || nothing)) {
     out.push_back({"rtk.lost", AlarmPriority::critical, f.name + ": no position from the rover", f.mission});
   } else if (holds_for(f.below_float_since, f.newest_fix, k_lost_s)) {
-    out.push_back({"rtk.lost", AlarmPriority::critical, f.name + ": RTK lost, ranges are kept but not used",
+    out.push_back({"rtk.lost", AlarmPriority::critical, f.name + ": RTK lost, ranges are stored but not used",
                    f.mission});
   } else if (f.correction_age_s && *f.correction_age_s > k_old_corrections_s) {
     out.push_back(
         {"rtk.lost", AlarmPriority::critical, f.name + ": no corrections for more than 10 s", f.mission});
   } else if (holds_for(f.float_since, f.newest_fix, k_float_s) && !nothing) {
-    out.push_back(
-        {"rtk.float", AlarmPriority::warning, f.name + ": RTK is FLOAT, ranges lose weight", f.mission});
+    out.push_back({"rtk.float", AlarmPriority::warning, f.name + ": RTK is FLOAT, ranges are weighted less",
+                   f.mission});
   }
 }
 
@@ -51,7 +51,7 @@ void ranges(const FlightPulse& f, std::vector<AlarmCondition>& out) {
 void clock(const FlightPulse& f, std::vector<AlarmCondition>& out) {
   if (!f.lag_s || std::abs(*f.lag_s) - 2 * f.lag_sigma_s.value_or(0) <= k_skew_s) return;
   char text[96];
-  std::snprintf(text, sizeof text, ": tag clock and rover clock differ by %.1f s", *f.lag_s);
+  std::snprintf(text, sizeof text, ": the clocks of tag and rover differ by %.1f s", *f.lag_s);
   out.push_back({"clock.skew", AlarmPriority::warning, f.name + text, f.mission});
 }
 
@@ -65,26 +65,30 @@ std::vector<AlarmCondition> alarm_conditions(const std::vector<FlightPulse>& fli
     out.push_back(
         {"storage.stalled",
          AlarmPriority::critical,
-         server.reason + ". Rows of devices wait in memory and are in the recording; the flight goes on",
+         server.reason +
+             ". Measurements of devices wait in memory and are in the raw recording; the flight continues",
          {}});
   }
   if (server.disk_free_bytes > 0 && server.disk_free_bytes < k_low_bytes) {
     out.push_back({"disk.low",
                    AlarmPriority::warning,
-                   server.disk_free_bytes < k_refuse_bytes ? "less than 500 MiB free: no new flight starts"
-                                                           : "less than 2 GiB free on the disk of the data",
+                   server.disk_free_bytes < k_refuse_bytes
+                       ? "less than 500 MiB free on the disk: no new flight can start; free some space"
+                       : "less than 2 GiB free on the disk of the data: free some space soon",
                    {}});
   }
   if (server.queued_rows > k_many_rows) {
-    out.push_back({"queue.behind",
-                   AlarmPriority::warning,
-                   "more measurements come than can be worked off; all are stored, live numbers come late",
-                   {}});
+    out.push_back(
+        {"queue.behind",
+         AlarmPriority::warning,
+         "measurements arrive faster than they can be processed; all are stored, live values are late",
+         {}});
   }
   if (!server.failed_tasks.empty()) {
     out.push_back({"server.task_failed",
                    AlarmPriority::warning,
-                   "a task of the server failed and goes on; the log has it, send it with a report: " +
+                   "a task of the server failed, the server continues; details are in the log, send it with "
+                   "a report: " +
                        server.failed_tasks,
                    {}});
   }

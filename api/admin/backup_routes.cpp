@@ -58,7 +58,7 @@ void add_backup_routes(Router& router, AdminApi& s) {
                   for (const auto& backup : s.backups.list()) {
                     if (backup.name == done.detail) return json_response(201, backup_json(backup));
                   }
-                  throw_problem(404, "not-found", "the backup is gone: newer ones took its place");
+                  throw_problem(404, "not-found", "the backup no longer exists: newer ones have replaced it");
                 });
               }});
 }

@@ -12,9 +12,10 @@ std::string ClockWatch::look(UtcTime wall, SteadyTime steady) {
       stepped_ = steady;
       char by[64];
       std::snprintf(by, sizeof by, "%+.1f s (limit %.0f s)", step_s, k_step_s);
-      text_ = "the system clock was set by " + std::string(by) + ", from " + to_rfc3339(*wall_) + " to " +
+      text_ = "the system clock was changed by " + std::string(by) + ", from " + to_rfc3339(*wall_) + " to " +
               to_rfc3339(wall) +
-              ": stamps of the system jump there; leases, schedules and what is kept do not. Check the clock";
+              ": timestamps of the system jump there; leases, schedules and retention times do not. Check "
+              "the clock";
     }
   }
   wall_ = wall;

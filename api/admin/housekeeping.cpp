@@ -64,8 +64,11 @@ void Housekeeping::round() {
   deps_.running.keep();
   const auto due = deps_.bin.empty_before(deps_.running.now_ns() - deps_.keep_deleted_ns);
   if (due && due.value() > 0) {
-    deps_.events.add(EventLevel::info, "bin.emptied",
-                     std::to_string(due.value()) + " deleted missions have been long enough in the bin", {});
+    deps_.events.add(
+        EventLevel::info, "bin.emptied",
+        std::to_string(due.value()) +
+            " deleted missions have reached the end of their time in the bin and are being removed",
+        {});
   }
   remove_marked();
   while (deps_.purge_answers && deps_.purge_answers()) {

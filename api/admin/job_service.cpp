@@ -32,7 +32,7 @@ Job new_job(UtcTime now, std::string kind, std::string request_json, std::option
 
 Result<Job> begun_anew(const Job& before) {
   if (before.state == JobState::succeeded) return make_error(Errc::conflict, "the job has succeeded");
-  if (!ended(before.state)) return make_error(Errc::conflict, "the job waits or runs already");
+  if (!ended(before.state)) return make_error(Errc::conflict, "the job is already waiting or running");
   Job job = new_job(before.created, before.kind, before.request.text, before.id);
   job.result_href = before.result_href;
   return job;
@@ -168,8 +168,8 @@ JobService::JobService(JobStore& jobs, Hub& hub, const Clock& clock, Executor& o
 JobService::~JobService() { stop(); }
 
 void JobService::start() {
-  const auto problem =
-      problem_json(503, "internal", "interrupted: the server was restarted while the job ran; send it again");
+  const auto problem = problem_json(
+      503, "internal", "interrupted: the server was restarted while the job was running; start it again");
   (void)state_->jobs.fail_unfinished(state_->clock.now(), {problem}).has_value();
   std::vector<std::string> turns;
   {
@@ -310,8 +310,8 @@ void JobService::State::run(const Task& task) {
     job.state = JobState::canceled;
   } else if (result.error().code == Errc::canceled) {
     job.state = JobState::failed;
-    job.problem = {problem_json(503, "internal",
-                                "interrupted: the server was stopped while the job ran; send it again")};
+    job.problem = {problem_json(
+        503, "internal", "interrupted: the server was stopped while the job was running; start it again")};
   } else {
     job.state = JobState::failed;
     job.problem = {problem_of(result.error()).body};

@@ -26,7 +26,7 @@ std::string hex(std::span<const unsigned char> bytes) {
 std::string random_hex_256() {
   std::array<unsigned char, 32> bytes{};
   if (RAND_bytes(bytes.data(), static_cast<int>(bytes.size())) != 1) {
-    throw std::runtime_error("the system gives no random numbers");
+    throw std::runtime_error("the system provides no random numbers");
   }
   return hex(bytes);
 }

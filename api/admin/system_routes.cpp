@@ -67,7 +67,7 @@ Response metrics(AdminApi& s, const Request&) {
       text += "# HELP " + name + ' ' + help + "\n# TYPE " + name + ' ' + type + '\n';
     text += name + labels + ' ' + std::to_string(value) + '\n';
   };
-  const char* lines = "Lines of ranges and fixes received, by what became of them";
+  const char* lines = "Rows of ranges and positions received, by result";
   add("anchord_ingest_lines_total", "counter", counts.lines_accepted, lines, "{result=\"accepted\"}");
   add("anchord_ingest_lines_total", "counter", counts.lines_duplicate, lines, "{result=\"duplicate\"}");
   add("anchord_ingest_lines_total", "counter", counts.lines_rejected, lines, "{result=\"rejected\"}");
@@ -83,10 +83,10 @@ Response metrics(AdminApi& s, const Request&) {
       "Messages replaced by a newer one of their key");
   add("anchord_ws_slow_disconnects_total", "counter", live.slow_disconnects,
       "Clients disconnected because they read too slowly");
-  add("anchord_live_queue_rows", "gauge", counts.queued_rows, "Rows that wait for the live estimates");
+  add("anchord_live_queue_rows", "gauge", counts.queued_rows, "Rows that are waiting for the live estimates");
   add("anchord_live_missions", "gauge", counts.missions_followed, "Missions in memory");
   add("anchord_live_missions_evicted_total", "counter", counts.missions_evicted,
-      "Missions that left memory for another one");
+      "Missions removed from memory to make room for another one");
   add("anchord_db_size_bytes", "gauge", storage.db_bytes, "Size of the database");
   add("anchord_disk_free_bytes", "gauge", storage.disk_free_bytes, "Free space where the database is");
   text += s.metrics_text();
@@ -98,9 +98,8 @@ Response metrics(AdminApi& s, const Request&) {
 
 constexpr std::size_t k_supported_events = 1000;
 constexpr std::string_view k_read_me =
-    "What an anchord server reports of itself, to find out what is wrong with it.\n"
-    "Left out: passwords, tokens, keys, measurements, positions of anchors.\n"
-    "Read it before you send it.\n";
+    "What an anchord server reports about itself, to find out what is wrong with it.\nLeft out: passwords, "
+    "tokens, keys, measurements, positions of anchors.\nRead it before you send it.\n";
 
 /// One archive for whoever helps from afar.
 Response support(AdminApi& s, const Request& request) {

@@ -46,8 +46,8 @@ Response list(AnchorApi& s, const Request& request) {
   if (!page.cursor.empty()) {
     const auto after = parse_network_id(page.cursor);
     if (!after)
-      throw_problem(422, "validation", "cursor is not one of ours",
-                    {{"/cursor", "bad_cursor", "is not one of ours"}});
+      throw_problem(422, "validation", "cursor was not issued by this server",
+                    {{"/cursor", "bad_cursor", "was not issued by this server"}});
     std::erase_if(all, [&](const auto& feature) { return feature.anchor.network_id <= after.value(); });
   }
   std::string next;

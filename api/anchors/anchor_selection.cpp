@@ -51,7 +51,7 @@ std::optional<Box> query_box(const Request& request) {
   nlohmann::json numbers;
   if (parse_json('[' + *text + ']', numbers) || numbers.size() != 4 ||
       !std::all_of(numbers.begin(), numbers.end(), [](const auto& n) { return n.is_number(); })) {
-    throw_problem(422, "validation", "bbox is west,south,east,north in degrees",
+    throw_problem(422, "validation", "bbox must be west,south,east,north in degrees",
                   {{"/bbox", "bad_value", "must be four numbers"}});
   }
   return Box{numbers[0], numbers[1], numbers[2], numbers[3]};
@@ -65,14 +65,14 @@ std::vector<AnchorFeature> selected_anchors(AnchorApi& s, const Request& request
   if (const auto text = request.query_value("revision")) {
     nlohmann::json value;
     if (parse_json(*text, value) || !value.is_number_unsigned())
-      throw_problem(422, "validation", "revision is a number",
+      throw_problem(422, "validation", "revision must be a number",
                     {{"/revision", "wrong_type", "must be a number"}});
     revision = value.get<std::uint64_t>();
     if (*revision == 0 || *revision > newest_revision(s))
       throw_problem(404, "not-found", "there is no revision " + *text);
   }
   if (view != "published" && view != "live")
-    throw_problem(422, "validation", "view is published or live",
+    throw_problem(422, "validation", "view must be published or live",
                   {{"/view", "unknown_value", "must be published or live"}});
   auto all = view == "live" ? live(s, query_mission(request)) : published_features(s, revision, number);
   const auto box = query_box(request);

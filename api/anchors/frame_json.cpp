@@ -150,7 +150,7 @@ FitRequest read_fit_request(const Json& body, std::vector<FieldError>& errors) {
       if (!id)
         inner.error("anchor", "bad_id", id.error().message);
       else if (globe)
-        inner.error("anchor", "twice", "give a place or an anchor, not both");
+        inner.error("anchor", "twice", "give either coordinates or an anchor");
       else
         pair.anchor = id.value();
       if (pair.pair.name.empty()) pair.pair.name = *text;

@@ -212,7 +212,7 @@ Response transform(AnchorApi& s, const Request& request) {
   const auto* points = fields.child("points");
   const SourceCrsSpec spec = read_source(fields, from == Space::crs);
   fields.finish();
-  if (to == Space::crs) errors.push_back({"/to", "unknown_value", "crs is what points come from"});
+  if (to == Space::crs) errors.push_back({"/to", "unknown_value", "crs is allowed only in from"});
   if (points == nullptr || !points->is_array() || points->size() > 10'000)
     errors.push_back({"/points", "wrong_type", "must be an array of at most 10000 points"});
   refuse_if_any(errors);
@@ -223,7 +223,7 @@ Response transform(AnchorApi& s, const Request& request) {
   if (frame_name) frame = find(s, *frame_name);
   if (uses(Space::local)) {
     if (frame) context.frame = frame_definition(*frame);
-    if (!context.frame) errors.push_back({"/frame", "not_fitted", "name a frame that was fitted"});
+    if (!context.frame) errors.push_back({"/frame", "not_fitted", "give a frame that has been fitted"});
   }
   if (site_text) {
     const auto id = parse_uuid(*site_text);
@@ -240,11 +240,11 @@ Response transform(AnchorApi& s, const Request& request) {
     else if (context.frame)
       context.enu.emplace(context.frame->origin);
     else
-      errors.push_back({"/site", "no_origin", "name a site with an origin"});
+      errors.push_back({"/site", "no_origin", "give a site with an origin"});
   }
   if (uses(Space::projected)) {
     if (!site || !site->projected_epsg) {
-      errors.push_back({"/site", "no_epsg", "name a site with projected_epsg"});
+      errors.push_back({"/site", "no_epsg", "give a site with projected_epsg"});
     } else {
       const auto projection = s.geo.projection(*site->projected_epsg, site->crs_frame);
       if (projection)
@@ -265,7 +265,7 @@ Response transform(AnchorApi& s, const Request& request) {
   for (std::size_t i = 0; i < points->size(); ++i) {
     const auto at = three_numbers((*points)[i]);
     if (!at || (from == Space::geo && std::abs(at->y()) > 90)) {
-      errors.push_back({"/points/" + std::to_string(i), "wrong_type", "must be three numbers of the space"});
+      errors.push_back({"/points/" + std::to_string(i), "wrong_type", "must be three numbers"});
       continue;
     }
     if (!errors.empty()) continue;  // the first point may be none, and then there is no system

@@ -35,7 +35,8 @@ Result<const Projection*> GeoService::projection(int epsg, const std::string& da
     return make_error(Errc::invalid_argument, "the datum of the base is not stated (crs.frame of the site)");
   const auto geographic = geographic_epsg(datum);
   if (!geographic)
-    return make_error(Errc::unsupported, "the datum '" + to_utf8(datum, 40) + "' is none that is known here");
+    return make_error(Errc::unsupported,
+                      "the datum '" + to_utf8(datum, 40) + "' is not known to this server");
   const auto& found = opened(epsg, *geographic);
   if (!found) return found.error();
   return &found.value();

@@ -31,7 +31,7 @@ class FolderSink final : public BundleSink {
   Result<void> row(const BundleRow& row) override {
     if (++entry_.rows > k_bundle_rows)
       return make_error(Errc::unsupported, "the mission has more than " + std::to_string(k_bundle_rows) +
-                                               " rows of " + table_->name + ", and no bundle holds more");
+                                               " rows of " + table_->name + ", more than a bundle can hold");
     if (!width_) begin_text(&row);
     text_ += bundle_line(*table_, row, *width_);
     if (text_.size() < k_write_bytes) return boost::outcome_v2::success();
@@ -126,7 +126,7 @@ Result<bool> BundleZipSource::next(BundleRow& row) {
   if (!more) return false;
   const std::string at = bundle_entry_name(*table_) + " line " + std::to_string(lines_->number());
   if (lines_->number() > k_bundle_rows + 1)
-    return make_error(Errc::invalid_argument, at + " is beyond what a bundle holds");
+    return make_error(Errc::invalid_argument, at + " is beyond the largest number of rows of a bundle");
   auto read = read_bundle_line(*table_, line, width_);
   if (!read) return make_error(read.error().code, at + ": " + read.error().message);
   row = std::move(read).value();

@@ -36,10 +36,9 @@ Response ranges_file(BundleApi& s, const Request& request) {
 /// What is wrong with a file of a stranger is the file's fault: 422, with what to do.
 [[noreturn]] void refuse(const Error& error) {
   if (error.code == Errc::bad_frame || error.code == Errc::invalid_argument)
-    throw_problem(422, "validation",
-                  error.message +
-                      ". Nothing was imported: take the bundle again from the "
-                      "server it comes from");
+    throw_problem(
+        422, "validation",
+        error.message + ". Nothing was imported: download the bundle again from the server it comes from");
   throw ProblemException{problem_of(error)};
 }
 template <class T>
@@ -60,7 +59,7 @@ void check_entries(const BundleStore& store, const BundleManifest& manifest) {
     const bool table = std::ranges::any_of(
         store.tables(), [&](const BundleTable& t) { return bundle_entry_name(t) == entry.name; });
     if (!table && !entry.name.starts_with(k_bundle_notes))
-      wrong += (wrong.empty() ? "" : ", ") + entry.name + " is no part of a bundle";
+      wrong += (wrong.empty() ? "" : ", ") + entry.name + " is not part of a bundle";
   }
   if (!wrong.empty()) refuse(make_error(Errc::bad_frame, wrong));
 }
@@ -97,7 +96,7 @@ Response take(BundleApi& s, const Request& request) {
           outcome.added() ? "ok" : "already here");
   if (outcome.added())
     s.taken(manifest.mission,
-            to_utf8(manifest.mission_name, 200) + " came as a bundle, by " + request.principal.name,
+            to_utf8(manifest.mission_name, 200) + " was imported from a bundle, by " + request.principal.name,
             std::ranges::any_of(outcome.tables, [](const auto& table) {
               return table.name == "revision" && table.n_added > 0;
             }));

@@ -109,10 +109,10 @@ class Pack {
     Response answer = s_.ask(asked);
     std::string body = whole_body(answer);
     if (answer.status == 200) return add(name, std::move(body));
-    if (answer.status == 404) return leave_out(name, "this server does not offer it");
+    if (answer.status == 404) return leave_out(name, "this server does not provide it");
     const auto problem = nlohmann::json::parse(body, nullptr, false);
     const bool told = problem.is_object() && problem.contains("detail") && problem["detail"].is_string();
-    leave_out(name, told ? problem["detail"].get<std::string>() : "this server does not offer it");
+    leave_out(name, told ? problem["detail"].get<std::string>() : "this server does not provide it");
   }
   void leave_out(const std::string& name, const std::string& why) {
     left_out_.push_back({{"name", name}, {"why", why}});

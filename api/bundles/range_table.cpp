@@ -20,7 +20,7 @@ FeatureTable head_of_ranges() {
   FeatureTable table;
   table.name = "ranges";
   table.title = "UWB ranges";
-  table.description = "Each where the receiver of the aircraft was; distances as received";
+  table.description = "Each at the position of the aircraft's receiver; distances as received";
   table.columns = {{"id", Type::integer},       {"time", Type::time},        {"t_us", Type::integer},
                    {"kind", Type::text},        {"tag", Type::text},         {"antenna", Type::integer},
                    {"anchor", Type::text},      {"seq", Type::integer},      {"distance_m", Type::real},

@@ -52,7 +52,9 @@ Result<CalibrationFrame> calibration_frame(FrameStore& frames, const std::string
   auto found = id ? frames.frame(FrameId{id.value()}) : frames.frame(name_or_id);
   if (!found) return make_error(found.error().code, "there is no frame " + name_or_id);
   auto definition = frame_definition(found.value());
-  if (!definition) return make_error(Errc::invalid_argument, "the frame " + name_or_id + " was never fitted");
+  if (!definition)
+    return make_error(Errc::invalid_argument,
+                      "the frame " + name_or_id + " has not been fitted: fit it first");
   return CalibrationFrame{std::move(found).value(), *std::move(definition)};
 }
 
@@ -89,15 +91,16 @@ Json use_site_outline(bool wanted, std::span<const FlightData> flights, const st
                       const std::optional<CalibrationFrame>& frame, SiteStore& sites,
                       FlightOptions& options) {
   if (!options.outline_m.empty()) return outline_provenance("request", nullptr, options, "");
-  if (!wanted) return outline_provenance("none", nullptr, options, "turned off by site_outline");
+  if (!wanted) return outline_provenance("none", nullptr, options, "switched off by site_outline");
   const auto site_id = common_site(flights);
-  if (!site_id) return outline_provenance("none", nullptr, options, "the flights name no common site");
+  if (!site_id) return outline_provenance("none", nullptr, options, "the flights have no common site");
   const Json id = to_string(*site_id);
   const auto site = sites.site(*site_id);
   if (!site || site.value().outline.empty())
     return outline_provenance("none", id, options, "the site has no outline");
   if (!origin && !frame)
-    return outline_provenance("none", id, options, "flights in local metres, and no frame to put it in");
+    return outline_provenance(
+        "none", id, options, "the flights are in local metres, and no frame is given to convert the outline");
   options.outline_m = outline_in_enu(site.value().outline, origin ? *origin : frame->definition.origin);
   if (!origin) {
     for (Eigen::Vector2d& corner : options.outline_m) {
@@ -107,7 +110,7 @@ Json use_site_outline(bool wanted, std::span<const FlightData> flights, const st
   }
   if (options.outline_m.size() < 3) {
     options.outline_m.clear();
-    return outline_provenance("none", id, options, "the site's outline is no polygon");
+    return outline_provenance("none", id, options, "the site's outline is not a polygon");
   }
   return outline_provenance("site", id, options, "");
 }

@@ -77,21 +77,22 @@ void add_check_points(Report& report, const nlohmann::ordered_json& provenance) 
     const auto at = v.get<std::vector<double>>();
     std::string out = number(at.at(0), 3) + " m east, " + number(at.at(1), 3) + " m north, " +
                       number(at.at(2), 3) + " m up";
-    if (p.is_number()) out += " (chance of so much " + number(p.get<double>(), 3) + ")";
+    if (p.is_number())
+      out += " (probability of such a difference by chance " + number(p.get<double>(), 3) + ")";
     return out;
   };
   for (const auto& point : checked["points"])
-    report.remarks.push_back("Check point " + point.value("network_id", "") + ": solved less surveyed " +
+    report.remarks.push_back("Check point " + point.value("network_id", "") + ": solved minus surveyed " +
                              words(point["delta_enu_m"], point["p_value"]) +
                              (point.value("agrees", false) ? ", agrees." : ", does not agree."));
   for (const auto& id : checked["not_found"])
     report.remarks.push_back("Check point " + id.get<std::string>() + " has no position here.");
   if (checked["shift"].is_object())
-    report.remarks.push_back("All check points together are off by " +
+    report.remarks.push_back("All check points together differ by " +
                              words(checked["shift"]["shift_enu_m"], checked["shift"]["p_value"]) +
                              (checked["shift"].value("significant", false)
-                                  ? ": look at the coordinates of the base, its datum and epoch."
-                                  : ", no more than chance."));
+                                  ? ": check the coordinates of the base station, their datum and epoch."
+                                  : ", which may be chance."));
 }
 
 }  // namespace
@@ -104,8 +105,8 @@ void describe(Report& report, const std::vector<Mission>& missions, const std::s
     fixes += flight.n_fixes;
     if (!flight.shared.bias_determined)
       report.remarks.push_back(flight.name +
-                               " does not determine its own range bias, and no profile of the kit gives it: "
-                               "the regions allow for it.");
+                               " does not determine its own range bias, and there is no profile of the kit "
+                               "that gives it: the regions include this uncertainty.");
   }
   report.methods.push_back(std::to_string(missions.size()) +
                            (missions.size() == 1 ? " flight, " : " flights, ") + std::to_string(ranges) +
@@ -126,10 +127,10 @@ void describe(Report& report, const std::vector<Mission>& missions, const std::s
           "Positions, range bias, range curve, time lag and antenna offset are solved together by robust "
           "weighted least squares in ") +
       (plane ? "the plane" : "three dimensions") + " (weights " + word("weights", "inverse_variance") +
-      ", loss " + loss + ", scale from the residuals). Covariances are scaled by what the residuals say.");
+      ", loss " + loss + ", scale from the residuals). Covariances are scaled by the residuals.");
   report.methods.emplace_back(
-      "95 % regions: Gaussian, from the scaled covariance with a floor of 4 cm per axis for what no residual "
-      "shows.");
+      "95 % regions: Gaussian, from the scaled covariance with at least 4 cm per axis for errors that no "
+      "residual shows.");
   const auto good = static_cast<std::size_t>(
       std::ranges::count_if(report.anchors, [](const ReportAnchor& a) { return a.estimate.acceptable(); }));
   report.remarks.push_back(std::to_string(good) + " of " + std::to_string(report.anchors.size()) +
@@ -145,7 +146,7 @@ void describe(Report& report, const std::vector<Mission>& missions, const std::s
   }
   if (asked > 0)
     report.remarks.push_back(over.empty() ? "Every position is within its accuracy goal."
-                                          : "Over the accuracy goal, which is overleaf: " + over + ".");
+                                          : "Outside the accuracy goal (see the next page): " + over + ".");
   for (const auto& anchor : report.anchors) {
     if (!anchor.estimate.mirror) continue;
     report.remarks.push_back(

@@ -33,8 +33,9 @@ void read_initial(Fields& fields, const Json& initial, FlightOptions& options,
     return;
   }
   if (!initial.is_object() || initial.size() > 1000)
-    return fields.error("initial", "wrong_type",
-                        "search, bearing_height, or an object: anchor id -> [east, north, up] in metres");
+    return fields.error(
+        "initial", "wrong_type",
+        "must be search, bearing_height, or an object: anchor id -> [east, north, up] in metres");
   Fields starts(initial, "/initial", errors);
   for (const auto& [id, place] : initial.items()) {
     if (const auto at = starts.numbers(id, 3, -k_far_m, k_far_m))
@@ -68,7 +69,8 @@ void read_height(Fields& fields, FlightOptions& options, std::vector<FieldError>
   if (const auto height = fields.number("anchor_height_m", -1000, 9000)) {
     options.anchor_height_m = *height;
     if (options.dims != Dims::two)
-      fields.error("anchor_height_m", "needs_dims_2", "a held height needs dims 2; in 3: height_prior");
+      fields.error("anchor_height_m", "needs_dims_2",
+                   "a held height needs dims 2; with dims 3 give height_prior");
   }
   const Json* prior = fields.child("height_prior");
   if (prior == nullptr) return;
@@ -77,7 +79,8 @@ void read_height(Fields& fields, FlightOptions& options, std::vector<FieldError>
   const auto sigma = inner.number("sigma_m", 0.01, 100, true);
   inner.finish();
   if (options.dims == Dims::two)
-    fields.error("height_prior", "needs_dims_3", "a height prior needs dims 3; in 2: anchor_height_m");
+    fields.error("height_prior", "needs_dims_3",
+                 "a height prior needs dims 3; with dims 2 give anchor_height_m");
   else if (height && sigma)
     options.height_prior = {*height, *sigma};
 }

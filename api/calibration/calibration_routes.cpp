@@ -118,10 +118,11 @@ std::vector<Gate> failures(const Estimate& estimate) {
       gates.push_back(std::move(item));
     }
   }
-  Response response = problem(409, "conflict",
-                              std::to_string(refused.size()) +
-                                  " anchors fail a gate; publish them by an override with a reason, each",
-                              errors);
+  Response response =
+      problem(409, "conflict",
+              std::to_string(refused.size()) +
+                  " anchors fail a gate; to publish one of them, give an override with a reason for it",
+              errors);
   auto body = Ordered::parse(response.body);
   body["gates"] = std::move(gates);
   response.body = to_wire(body);
@@ -365,8 +366,8 @@ Response revisions(CalibrationApi& s, const Request& request) {
   if (!page.cursor.empty()) {
     nlohmann::json value;
     if (parse_json(page.cursor, value) || !value.is_number_unsigned())
-      throw_problem(422, "validation", "cursor is not one of ours",
-                    {{"/cursor", "bad_cursor", "is not one of ours"}});
+      throw_problem(422, "validation", "cursor was not issued by this server",
+                    {{"/cursor", "bad_cursor", "was not issued by this server"}});
     before = value.get<std::uint64_t>();
   }
   auto rows = value_or_problem(s.revisions.revisions(page.limit + 1, before));

@@ -70,7 +70,7 @@ PlacedEstimates other(CalibrationApi& s, const Request& request, std::string fal
     return placed(value_or_problem(s.revisions.published(*number)));
   if (name == "nothing") return {};
   throw_problem(
-      422, "validation", "against is a calibration, a revision or \"published\"",
+      422, "validation", "against must be a calibration, a revision or \"published\"",
       {{"/against", "unknown_value", "must be an id of a calibration, a number, or \"published\""}});
 }
 

@@ -46,12 +46,12 @@ std::optional<DatumRequest::Mark> read_mark(const Json& value, std::vector<Field
   const Json* measured = fields.child("measured");
   if (measured != nullptr) mark.measured = read_place(*measured, "/mark/measured", errors);
   if ((measured != nullptr) == fields.has("anchor"))
-    fields.error("measured", "conflict", "say where the mark is now: anchor or measured, one of them");
+    fields.error("measured", "conflict", "give where the mark is now: either anchor or measured");
   std::optional<Wgs84> known;
   if (const Json* at = fields.child("known"))
     known = read_place(*at, "/mark/known", errors);
   else
-    fields.error("known", "required", "known is missing: where the mark is in truth");
+    fields.error("known", "required", "known is missing: give the true position of the mark");
   fields.finish();
   if (!known) return std::nullopt;
   mark.known = *known;
@@ -96,7 +96,7 @@ DatumRequest read_datum_request(const Json& body, std::vector<FieldError>& error
     ++given;
     out.helmert = read_helmert(*helmert, errors);
   }
-  if (given != 1) fields.error("", "conflict", "say the change one way: shift, mark or helmert");
+  if (given != 1) fields.error("", "conflict", "give the change in one way: shift, mark or helmert");
   out.sigma_m = fields.number("sigma_m", 0, 100).value_or(0);
   out.note = fields.text("note", 500, true).value_or("");
   fields.finish();

@@ -51,7 +51,7 @@ DatumChange change_of(const DatumRequest& wanted, const std::vector<PublishedPos
     if (position.estimate.anchor == *mark.anchor)
       return datum_change_between(*position.estimate.best->wgs84, mark.known);
   }
-  throw_problem(422, "validation", "the mark is not published here",
+  throw_problem(422, "validation", "the mark is not a published anchor of this site",
                 {{"/mark/anchor", "unknown_anchor",
                   to_string(*mark.anchor) + " has no published position at this site"}});
 }

@@ -36,7 +36,8 @@ Result<std::string> KitProfiles::kit_of(const std::string& device) {
                       });
     if (flew) return mission.kit;
   }
-  return make_error(Errc::not_found, "no kit and no tag of a kit is called " + to_utf8(device, 60));
+  return make_error(Errc::not_found,
+                    "there is no kit, and no tag of a kit, with the name " + to_utf8(device, 60));
 }
 
 Result<std::optional<KitProfiles::InUse>> KitProfiles::for_flights(const std::string& kit,

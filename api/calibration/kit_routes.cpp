@@ -70,7 +70,7 @@ Response put(CalibrationApi& s, const Request& request) {
     throw_problem(422, "validation", profile.error().message, {{"", "bad_profile", profile.error().message}});
   const std::string kit = known ? known.value() : profile.value().kit;
   if (profile.value().kit != kit || kit.empty())
-    throw_problem(422, "validation", "the profile is of another kit",
+    throw_problem(422, "validation", "the profile belongs to another kit",
                   {{"/kit", "other_kit", "must be '" + to_utf8(kit, 80) + "'"}});
   if (!known && id != kit) throw ProblemException{problem_of(known.error())};
   const auto before = value_or_problem(s.profiles.store().profile(kit));

@@ -15,7 +15,7 @@ constexpr double k_far_m = 20'000;  // of the origin, as for the track
 void read_outline(const nlohmann::json& list, const std::string& at, FlightOptions& options,
                   std::vector<FieldError>& errors) {
   if (!list.is_array() || list.size() < 3 || list.size() > 1000) {
-    errors.push_back({at, "out_of_range", "3 to 1000 corners, each [east, north] in metres"});
+    errors.push_back({at, "out_of_range", "must be 3 to 1000 corners, each [east, north] in metres"});
     return;
   }
   for (const auto& corner : list) {
@@ -24,7 +24,7 @@ void read_outline(const nlohmann::json& list, const std::string& at, FlightOptio
     const Eigen::Vector2d point = good ? Eigen::Vector2d(corner[0].get<double>(), corner[1].get<double>())
                                        : Eigen::Vector2d(2 * k_far_m, 0);
     if (!(point.norm() < k_far_m)) {
-      errors.push_back({at, "out_of_range", "a corner is [east, north] in metres, within 20 km"});
+      errors.push_back({at, "out_of_range", "a corner must be [east, north] in metres, within 20 km"});
       return;
     }
     options.outline_m.push_back(point);
@@ -72,7 +72,7 @@ void read_priors(const nlohmann::json& value, const std::string& base, FlightOpt
   if (const auto sigma = fields.number("rss_sigma_db", 1, 30)) options.level_sigma_db = *sigma;
   if (const auto* anchors = fields.child("anchors")) {
     if (!anchors->is_object() || anchors->size() > 1000) {
-      errors.push_back({base + "/anchors", "wrong_type", "an object: anchor id -> its priors"});
+      errors.push_back({base + "/anchors", "wrong_type", "must be an object: anchor id -> its priors"});
     } else {
       for (const auto& [id, priors] : anchors->items()) {
         const std::string at = base + "/anchors/" + to_utf8(id, 40);

@@ -28,8 +28,8 @@ void check_secret(const Json& options, Json& merged, std::vector<FieldError>& er
   if (options.contains("password_file")) {
     errors.push_back(
         {"/options/password_file", "refused",
-         "a file of the server is not named over REST: send the password itself as "
-         "options.password; it is kept in a file that only the server reads and never returned"});
+         "a path of the server cannot be given over REST: send the password itself as options.password; it "
+         "is kept in a file that only the server can read, and is never returned"});
   }
   const auto given = options.find("password");
   if (given == options.end()) return;
@@ -43,7 +43,7 @@ void check_secret(const Json& options, Json& merged, std::vector<FieldError>& er
       std::none_of(text->begin(), text->end(), [](unsigned char c) { return c < 0x20 || c == 0x7f; });
   if (!plain)
     errors.push_back({"/options/password", "out_of_range",
-                      "must be a text of at most 200 bytes without control characters; empty: forget it"});
+                      "must be a string of at most 200 bytes without control characters; empty removes it"});
 }
 
 }  // namespace

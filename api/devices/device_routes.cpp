@@ -88,7 +88,7 @@ Response remove(DeviceApi& s, const Request& request) {
   if (const auto holder = s.stream.holder(); holder && device.config.enabled)
     throw_problem(409, "conflict",
                   device.config.name + " is in use: " + holder->name +
-                      " records with it; finish that mission first, or switch the device off");
+                      " is recording with it; finish that mission first, or switch the device off");
   value_or_problem(s.devices.remove(device.config.id, device.config.version));
   s.audit(request, "device.delete " + to_string(device.config.id));
   Response response;
@@ -149,7 +149,8 @@ Response get_uwb(DeviceApi& s, const Request& request) {
   const bool others = query_flag(request, "devices");
   // Asking them stops ranging for seconds: not for those who only look.
   if (others && !request.principal.has(Role::op) && !request.principal.has(Role::admin))
-    throw_problem(403, "forbidden", "asking the anchors stops ranging; this needs the role operator");
+    throw_problem(403, "forbidden",
+                  "reading the settings of the anchors interrupts ranging; this needs the role operator");
   const Json settings = ask(s, device.config.id, "get_uwb", others ? R"({"devices":true})" : "{}");
   return uwb_answer(settings, others ? settings.value("devices", Json::array()) : Json());
 }
@@ -177,10 +178,11 @@ Response put_uwb(DeviceApi& s, const Request& request) {
       if (!one.value("why", "").empty())
         why += "; " + one.value("network_id", "") + " " + one.value("why", "");
     }
-    throw_problem(422, "state",
-                  done.value("rolled_back", false)
-                      ? "not every device took them, so all have the old settings" + why
-                      : "not every device took them, and not all have the old settings either" + why);
+    throw_problem(
+        422, "state",
+        done.value("rolled_back", false)
+            ? "not every device accepted the settings, so all have the old ones again" + why
+            : "not every device accepted the settings, and not all could be set back to the old ones" + why);
   }
   return uwb_answer(ask(s, device.config.id, "get_uwb", "{}"), done.value("devices", Json::array()));
 }

@@ -17,8 +17,10 @@ void DeviceStream::change(std::vector<Holder> next) {
   (void)stack_.exchange(std::move(next));
   if (deps_.devices.recording_into() != now) deps_.devices.record_into(now);
   if (const auto kept = deps_.store.keep_device_stream(ids); !kept) {
-    deps_.events.add(EventLevel::warning, "devices.not_kept",
-                     "a restart would not know whose the devices are: " + kept.error().message, now);
+    deps_.events.add(
+        EventLevel::warning, "devices.not_kept",
+        "after a restart the server would not know which mission has the devices: " + kept.error().message,
+        now);
   }
 }
 
@@ -31,9 +33,10 @@ std::optional<DeviceStream::Holder> DeviceStream::begin(const Mission& mission) 
   }
   if (before->id == mission.id) return std::nullopt;
   if (!deps_.devices.devices().empty()) {
-    deps_.events.add(EventLevel::warning, "devices.held",
-                     mission.name + " gets no rows of the devices: " + before->name + " records with them",
-                     mission.id);
+    deps_.events.add(
+        EventLevel::warning, "devices.held",
+        mission.name + " gets no measurements of the devices: " + before->name + " is recording with them",
+        mission.id);
   }
   return before;
 }
@@ -49,7 +52,7 @@ std::optional<DeviceStream::Holder> DeviceStream::take(const Mission& mission, c
   if (before) {
     deps_.events.add(EventLevel::critical, "devices.lost",
                      by + " gave the devices of " + before->name + " to " + mission.name +
-                         "; they come back when that ends",
+                         "; they are given back when that mission ends",
                      before->id);
     deps_.events.add(EventLevel::warning, "devices.taken",
                      mission.name + " took the devices of " + before->name, mission.id);
@@ -76,9 +79,10 @@ std::optional<DeviceStream::Holder> DeviceStream::holder() const {
 void DeviceStream::resume() {
   const auto kept = deps_.store.device_stream();
   if (!kept) {
-    deps_.events.add(
-        EventLevel::critical, "devices.not_resumed",
-        "what the devices recorded into before the restart cannot be read: " + kept.error().message, {});
+    deps_.events.add(EventLevel::critical, "devices.not_resumed",
+                     "the mission that the devices recorded into before the restart cannot be read: " +
+                         kept.error().message,
+                     {});
     return;
   }
   const std::scoped_lock changing(changing_);
@@ -91,7 +95,7 @@ void DeviceStream::resume() {
   change(std::move(next));
   if (const auto now = holder()) {
     deps_.events.add(EventLevel::info, "devices.resumed",
-                     "the devices go on recording into " + now->name + " after the restart", now->id);
+                     "the devices continue recording into " + now->name + " after the restart", now->id);
   }
 }
 
@@ -104,9 +108,11 @@ std::vector<AlarmCondition> DeviceStream::alarms() const {
     lost = (*stack)[stack->size() - 2];
   }
   if (deps_.devices.devices().empty()) return {};  // nobody misses rows that there are none of
-  return {{"devices.lost", AlarmPriority::critical,
-           lost.name + ": its devices record into " + has.name + "; they come back when that ends", lost.id},
-          {"devices.taken", AlarmPriority::warning, has.name + " has the devices of " + lost.name, has.id}};
+  return {
+      {"devices.lost", AlarmPriority::critical,
+       lost.name + ": its devices record into " + has.name + "; they are given back when that mission ends",
+       lost.id},
+      {"devices.taken", AlarmPriority::warning, has.name + " has the devices of " + lost.name, has.id}};
 }
 
 }  // namespace anchord::api

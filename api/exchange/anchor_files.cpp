@@ -54,11 +54,11 @@ FileHeight checked_height(const Anchors& anchors, const Request& request) {
   if (codes.size() > 1)
     refuse("the anchors are in " + std::to_string(codes.size()) +
            " map systems, the first EPSG:" + std::to_string(*codes.begin()) +
-           " and EPSG:" + std::to_string(*std::next(codes.begin())) + ": name one site with site=");
+           " and EPSG:" + std::to_string(*std::next(codes.begin())) + ": select one site with site=");
   if (height == FileHeight::orthometric)
     complete(
         anchors, [](const auto& f) { return !f.height_orthometric_m; }, "height above the geoid",
-        "install a geoid model (geoid.dir), or take height=ellipsoidal");
+        "install a geoid model (geoid.dir), or use height=ellipsoidal");
   return height;
 }
 
@@ -93,7 +93,7 @@ std::string bytes_of(ExchangeApi& s, std::string_view format, const Anchors& anc
 Response anchor_file(ExchangeApi& s, std::string_view format, const Request& request) {
   const auto file =
       std::find_if(k_files.begin(), k_files.end(), [&](const File& f) { return f.format == format; });
-  if (file == k_files.end()) throw_problem(406, "not-acceptable", "there is no file of this format");
+  if (file == k_files.end()) throw_problem(406, "not-acceptable", "there is no file in this format");
   if (file->has_height)
     check_query(request, {"revision", "site", "bbox", "format", "height"});
   else

@@ -123,7 +123,7 @@ FeatureTable anchors_table(std::span<const AnchorFeature> anchors) {
 FeatureTable ellipses_table(std::span<const AnchorFeature> anchors) {
   FeatureTable out{.name = "ellipses95",
                    .title = "95 % ellipses",
-                   .description = "Where the anchor is with 95 % probability, in the plane",
+                   .description = "Horizontal area that contains the anchor with 95 % probability",
                    .geometry = FeatureTable::Geometry::polygon,
                    .columns = {{"network_id"},
                                {"major_m", Type::real},

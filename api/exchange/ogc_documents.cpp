@@ -32,7 +32,7 @@ Ordered parameter(std::string_view name, std::string_view where, std::string_vie
 Ordered operation(std::string id, std::string_view summary, std::string_view type, Ordered parameters) {
   Ordered answer{{"description", "The document"}};
   answer["content"][std::string(type)]["schema"] = {{"type", "object"}};
-  Ordered fault{{"description", "application/problem+json with what to do"}};
+  Ordered fault{{"description", "application/problem+json that says what to do"}};
   Ordered out{{"operationId", std::move(id)}, {"summary", summary}, {"tags", {"features"}}};
   if (!parameters.empty()) out["parameters"] = std::move(parameters);
   out["responses"] = {{"200", std::move(answer)}, {"default", std::move(fault)}};
@@ -63,8 +63,8 @@ Ordered ogc_landing(const std::string& root) {
           {"description", "UWB anchors of buildings, located on the globe by flights round them"},
           {"links",
            {ogc_link(root, "self", k_json, "This document"),
-            ogc_link(root + "/api", "service-desc", k_openapi, "The interface"),
-            ogc_link(root + "/conformance", "conformance", k_json, "What it conforms to"),
+            ogc_link(root + "/api", "service-desc", k_openapi, "The API description"),
+            ogc_link(root + "/conformance", "conformance", k_json, "Conformance classes of this server"),
             ogc_link(root + "/collections", "data", k_json, "The collections")}}};
 }
 
@@ -120,13 +120,13 @@ Ordered ogc_openapi(const std::string& root) {
     paths[path] = operation("describe_" + id, c.title, k_json, Ordered::array());
     paths[path + "/items"] =
         operation("get_" + id, c.description, k_geojson,
-                  {parameter("limit", "query", "Most features of a page", limit_schema(c)), reference("bbox"),
-                   reference("bbox-crs"), reference("datetime"), reference("crs")});
+                  {parameter("limit", "query", "Largest number of features on a page", limit_schema(c)),
+                   reference("bbox"), reference("bbox-crs"), reference("datetime"), reference("crs")});
     paths[path + "/items/{featureId}"] =
         operation("get_one_of_" + id, c.title, k_geojson, {reference("featureId"), reference("crs")});
   }
   Ordered parameters;
-  parameters["limit"] = parameter("limit", "query", "Most features of a page",
+  parameters["limit"] = parameter("limit", "query", "Largest number of features on a page",
                                   {{"type", "integer"},
                                    {"minimum", 1},
                                    {"maximum", most},
@@ -136,13 +136,14 @@ Ordered ogc_openapi(const std::string& root) {
                 {{"type", "array"}, {"minItems", 4}, {"maxItems", 6}, {"items", {{"type", "number"}}}});
   parameters["bbox"]["style"] = "form";
   parameters["bbox"]["explode"] = false;
-  parameters["bbox-crs"] = parameter("bbox-crs", "query", "System of bbox", uri);
+  parameters["bbox-crs"] = parameter("bbox-crs", "query", "Coordinate reference system of bbox", uri);
   parameters["datetime"] = parameter("datetime", "query", "RFC 3339 instant, or begin/end; .. is open", text);
-  parameters["crs"] = parameter("crs", "query", "System of the coordinates in the answer", uri);
+  parameters["crs"] =
+      parameter("crs", "query", "Coordinate reference system of the coordinates in the answer", uri);
   parameters["featureId"] = parameter("featureId", "path", "Id of a feature", text);
   Ordered schemes;
   schemes["basic"] = {
-      {"type", "http"}, {"scheme", "basic"}, {"description", "Any name; the token as password"}};
+      {"type", "http"}, {"scheme", "basic"}, {"description", "Any user name; the token as the password"}};
   schemes["bearer"] = {{"type", "http"}, {"scheme", "bearer"}};
   return {{"openapi", "3.0.3"},
           {"info", {{"title", "anchord: OGC API Features"}, {"version", "1.0.0"}}},

@@ -25,7 +25,8 @@ void only(const Request& request, std::initializer_list<std::string_view> allowe
                     {{"/" + to_utf8(key, 60), "unknown_field", "no such query parameter"}});
   }
   const auto format = request.query_value("f");
-  if (format && *format != "json" && *format != "geojson") bad("f", "must be json: there is no other form");
+  if (format && *format != "json" && *format != "geojson")
+    bad("f", "must be json: no other format is available");
 }
 
 OgcCrs named_crs(const Request& request, const char* name, bool heights) {
@@ -55,7 +56,7 @@ OgcBox box_of(const Request& request, const std::string& text) {
   const auto crs = named_crs(request, "bbox-crs", true);
   auto n = numbers(text);
   if (n.size() != 4 && n.size() != 6)
-    bad("bbox", "is four numbers, or six with heights: west,south,east,north");
+    bad("bbox", "must be four numbers, or six with heights: west,south,east,north");
   constexpr double k_any = std::numeric_limits<double>::infinity();
   if (n.size() == 4) n = {n[0], n[1], -k_any, n[2], n[3], k_any};
   if (crs.latitude_first) {
@@ -69,7 +70,7 @@ OgcBox box_of(const Request& request, const std::string& text) {
 std::optional<UtcTime> instant(std::string_view text) {
   if (text.empty() || text == "..") return std::nullopt;
   const auto time = parse_rfc3339(text);
-  if (!time) bad("datetime", "is an RFC 3339 instant, or two with / between them; .. is an open end");
+  if (!time) bad("datetime", "must be an RFC 3339 time, or two with / between them; .. is an open end");
   return time.value();
 }
 
@@ -77,7 +78,7 @@ OgcInterval interval_of(const std::string& text) {
   const auto slash = text.find('/');
   if (slash == std::string::npos) {
     const auto at = instant(text);
-    if (!at) bad("datetime", "is an RFC 3339 instant, or two with / between them; .. is an open end");
+    if (!at) bad("datetime", "must be an RFC 3339 time, or two with / between them; .. is an open end");
     return {at, at};
   }
   OgcInterval out{instant(std::string_view(text).substr(0, slash)),

@@ -191,8 +191,10 @@ Page page_of(std::vector<Item> all, const OgcQuery& query) {
   if (!query.cursor.empty()) {
     from = std::ranges::find(all, query.cursor, &Item::key);
     if (from == all.end())
-      throw_problem(400, "malformed", "cursor is not one of ours, or what it named is gone: begin again",
-                    {{"/cursor", "bad_cursor", "is not one of ours"}});
+      throw_problem(400, "malformed",
+                    "cursor was not issued by this server, or its page no longer exists: start again from "
+                    "the first page",
+                    {{"/cursor", "bad_cursor", "was not issued by this server"}});
   }
   for (; from != all.end(); ++from) {
     if (page.features.size() == query.limit) {
@@ -211,8 +213,8 @@ Page track_page(ExchangeApi& s, const OgcQuery& query) {
   if (!query.cursor.empty()) {
     const auto id = parse_uuid(query.cursor);
     if (!id)
-      throw_problem(400, "malformed", "cursor is not one of ours",
-                    {{"/cursor", "bad_cursor", "is not one of ours"}});
+      throw_problem(400, "malformed", "cursor was not issued by this server",
+                    {{"/cursor", "bad_cursor", "was not issued by this server"}});
     after = MissionId{id.value()};
   }
   Page page;

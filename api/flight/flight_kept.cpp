@@ -205,7 +205,8 @@ void FlightService::State::recover() {
       });
     } else {
       deps.events.add(EventLevel::critical, "procedure.lost",
-                      "the flight before the restart cannot be read: the pilot has it", flying[i].first);
+                      "the flight from before the restart cannot be read: the pilot has to fly the aircraft",
+                      flying[i].first);
     }
   }
 }

@@ -16,12 +16,12 @@ Error cannot(std::string why) { return make_error(Errc::invalid_argument, std::m
 /// What a person has confirmed is what is taken.
 Result<void> as_seen(const FlightService::PlanOrder& order, const flight::PlanProposal& proposal) {
   if (order.revision && *order.revision != proposal.plan.version)
-    return cannot("it would be revision " + std::to_string(proposal.plan.version) + ", not " +
+    return cannot("the plan would be revision " + std::to_string(proposal.plan.version) + ", not " +
                   std::to_string(*order.revision) + ": read the difference again");
   const auto next = proposal.change.next + 1;
   if (order.next_waypoint && *order.next_waypoint != next)
     return cannot("the aircraft has moved on, waypoint " + std::to_string(next) +
-                  " would be the next: read the difference again");
+                  " would be next now: read the difference again");
   return boost::outcome_v2::success();
 }
 
@@ -97,7 +97,8 @@ Result<FlightService::PlanDifference> FlightService::take_plan(const MissionId& 
     if (!taken) continue;
     return PlanDifference{std::move(basis->plan), std::move(proposal)};
   }
-  return cannot("the flight moves on faster than the change can be checked: hold, then take it");
+  return cannot(
+      "the flight moves on faster than the change can be checked: command Hold, then take the change");
 }
 
 Result<void> FlightService::order_anchor(const MissionId& mission, NetworkId anchor,
@@ -110,8 +111,9 @@ Result<void> FlightService::order_anchor(const MissionId& mission, NetworkId anc
       const auto e = std::ranges::find(view.estimates, anchor, &Estimate::anchor);
       if (e == view.estimates.end() || !e->best) return cannot(to_string(anchor) + " has no position yet");
       if (e->verdict != Verdict::ok)
-        return cannot(to_string(anchor) + " is " + std::string(k_verdict_words.word(e->verdict)) +
-                      ", its position may be far off: fly where it is seen from another side, or give it up");
+        return cannot(
+            to_string(anchor) + " is " + std::string(k_verdict_words.word(e->verdict)) +
+            ", its position may be far off: fly where it can be measured from another side, or give it up");
     }
   }
   return state_->operate([&](auto& operations, const auto& now) {

@@ -41,7 +41,7 @@ T granted(Result<T> result) {
 Response ask_for_control(FlightApi& s, const Request& request, const MissionId& mission) {
   const auto lease = s.flights.control();
   if (!lease || lease->mission != mission)
-    throw_problem(409, "no-control", "nobody has control of this mission: take control first (action: take)");
+    throw_problem(409, "no-control", "nobody has control of this mission: take control first (action take)");
   const std::string text = request.principal.name + " asks " + lease->name + " for control";
   s.events.add(EventLevel::warning, "control.asked", text, mission);
   return json_response(200, lease_json(*lease, false));
@@ -107,7 +107,7 @@ Response checklist(FlightApi& s, const Request& request) {
   std::optional<PlanId> plan;
   if (const auto text = request.query_value("plan")) {
     const auto id = parse_uuid(*text);
-    if (!id) throw_problem(422, "validation", "plan is no id", {{"/plan", "bad_id", id.error().message}});
+    if (!id) throw_problem(422, "validation", "plan is not an id", {{"/plan", "bad_id", id.error().message}});
     plan = PlanId{id.value()};
   }
   return json_response(200, checklist_json(s.flights.checklist(mission, plan)));

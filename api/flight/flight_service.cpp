@@ -50,8 +50,9 @@ void FlightService::State::publish_events() {
 
 void FlightService::start() {
   if (!guarded("flight before the restart", [this] { state_->recover(); })) {
-    state_->deps.events.add(EventLevel::critical, "procedure.lost",
-                            "the flight before the restart cannot be read: the pilot has it", std::nullopt);
+    state_->deps.events.add(
+        EventLevel::critical, "procedure.lost",
+        "the flight from before the restart cannot be read: the pilot has to fly the aircraft", std::nullopt);
   }
   if (state_->deps.now_s || state_->thread.joinable()) return;
   state_->thread = Thread("anchord-fly", [this] {
@@ -254,7 +255,7 @@ Result<FlightCommand> FlightService::act(const MissionId& mission, const Order& 
   BOOST_OUTCOME_TRY(const auto record, state_->deps.missions.mission(mission));
   std::optional<Plan> plan;
   if (order.action == flight::FlightAction::start) {
-    if (!order.plan) return make_error(Errc::invalid_argument, "start needs the plan that is to be flown");
+    if (!order.plan) return make_error(Errc::invalid_argument, "start needs plan: the plan to fly");
     BOOST_OUTCOME_TRY(const auto stored, state_->deps.plans.plan(*order.plan));
     plan = plan_of(stored);
     BOOST_OUTCOME_TRYV(state_->deps.structures.join(*plan));

@@ -32,8 +32,9 @@ std::string IntervalHistogram::text(std::string_view name) const {
            std::to_string(n) + '\n';
   }
   out += of + "_sum " + std::to_string(sum_s_) + '\n' + of + "_count " + std::to_string(n) + '\n';
-  return out + "# HELP " + of + "_worst The longest of them\n# TYPE " + of + "_worst gauge\n" + of +
-         "_worst " + std::to_string(worst_s_) + '\n';
+  return out + "# HELP " + of +
+         "_worst Longest time from one round of the safety checks to the next\n# TYPE " + of +
+         "_worst gauge\n" + of + "_worst " + std::to_string(worst_s_) + '\n';
 }
 
 }  // namespace anchord::api

@@ -63,7 +63,7 @@ Response order_anchor(FlightApi& s, const Request& request) {
   const auto mission = named_mission(s.missions, request).id;
   const auto anchor = parse_network_id(request.params.at("anchor"));
   if (!anchor)
-    throw_problem(422, "validation", "anchor is no network id",
+    throw_problem(422, "validation", "anchor is not a network id",
                   {{"/anchor", "bad_id", anchor.error().message}});
   std::vector<FieldError> errors;
   const auto body = json_body(request);

@@ -130,8 +130,8 @@ std::string write_bundle_manifest(const BundleManifest& manifest) {
 
 Result<BundleManifest> read_bundle_manifest(std::string_view text) {
   json root;
-  if (const auto error = parse_json(text, root)) return refused("the manifest is no JSON: " + error->detail);
-  if (text_of(root, "format") != k_format) return refused("the manifest is none of a flight bundle");
+  if (const auto error = parse_json(text, root)) return refused("the manifest is not JSON: " + error->detail);
+  if (text_of(root, "format") != k_format) return refused("the manifest is not that of a flight bundle");
   if (const auto version = count_of(root, "version"); version != k_bundle_version)
     return make_error(Errc::unsupported, "the bundle is of version " + std::to_string(version) +
                                              " of the format, this server reads " +
@@ -139,7 +139,7 @@ Result<BundleManifest> read_bundle_manifest(std::string_view text) {
   BundleManifest out;
   const auto mission = root.find("mission");
   const auto id = parse_uuid(mission != root.end() ? text_of(*mission, "id") : std::string{});
-  if (!id) return refused("the manifest names no mission");
+  if (!id) return refused("the manifest gives no mission");
   out.mission = MissionId{id.value()};
   out.mission_name = text_of(*mission, "name");
   out.made_by = text_of(root, "made_by");
@@ -149,12 +149,13 @@ Result<BundleManifest> read_bundle_manifest(std::string_view text) {
     out.entries.push_back({text_of(entry, "name"), count_of(entry, "bytes"), count_of(entry, "rows"),
                            text_of(entry, "sha256")});
   if (text_of(root, "digest") != "sha256:" + bundle_digest(out))
-    return refused("the manifest was changed: its digest is not that of its entries");
+    return refused("the manifest was changed: its digest does not match its entries");
   return out;
 }
 
 Result<BundleManifest> checked_bundle(const ZipReader& zip) {
-  if (!zip.has(k_bundle_manifest)) return refused("this is no flight bundle: it has no manifest.json");
+  if (!zip.has(k_bundle_manifest))
+    return refused("this is not a valid flight bundle: it has no manifest.json");
   BOOST_OUTCOME_TRY(const std::string text, zip.text(k_bundle_manifest, k_manifest_bytes));
   BOOST_OUTCOME_TRY(auto manifest, read_bundle_manifest(text));
   std::string wrong;
@@ -175,12 +176,12 @@ Result<BundleManifest> checked_bundle(const ZipReader& zip) {
     if (!sum)
       add(sum.error().message);
     else if (sum.value() != entry.sha256_hex)
-      add(entry.name + " has another digest than the manifest says");
+      add(entry.name + " does not have the digest of the manifest");
   }
   for (const auto& entry : zip.entries()) {
     if (!named.contains(entry.name)) add(entry.name + " is not in the manifest");
   }
-  if (!wrong.empty()) return refused("the bundle is not what its manifest says: " + wrong);
+  if (!wrong.empty()) return refused("the bundle does not match its manifest: " + wrong);
   return manifest;
 }
 
@@ -227,14 +228,14 @@ Result<BundleRow> read_bundle_line(const BundleTable& table, std::string_view li
   json value;
   if (const auto error = parse_json(line, value)) return make_error(Errc::invalid_argument, error->detail);
   if (!value.is_array() || value.size() != n_columns)
-    return make_error(Errc::invalid_argument, "is no array of " + std::to_string(n_columns) + " values");
+    return make_error(Errc::invalid_argument, "is not an array of " + std::to_string(n_columns) + " values");
   BundleRow row(table.columns.size());
   for (std::size_t i = 0; i < n_columns; ++i) {
     auto cell = read_cell(value[i], table.columns[i].kind);
     if (!cell)
-      return make_error(
-          Errc::invalid_argument,
-          table.columns[i].name + " is no " + std::string(k_cell_kind_words.word(table.columns[i].kind)));
+      return make_error(Errc::invalid_argument,
+                        table.columns[i].name + " is not a valid " +
+                            std::string(k_cell_kind_words.word(table.columns[i].kind)));
     row[i] = *std::move(cell);
   }
   return row;

@@ -201,8 +201,8 @@ class Importer {
                     {k_unreadable,
                      {},
                      std::to_string(commas + 1) +
-                         " numbers separated by commas alone: decimal commas need blanks or semicolons "
-                         "between the numbers, else give time in ms, distance in mm and level in dBm only"});
+                         " numbers separated by commas alone: with decimal commas, separate the numbers by "
+                         "spaces or semicolons; else give only time in ms, distance in mm and RSS in dBm"});
     const auto digit = [&](std::size_t i) { return i < line.size() && line[i] >= '0' && line[i] <= '9'; };
     std::array<double, 3> value{};
     std::size_t n = 0;
@@ -330,7 +330,7 @@ class Importer {
     m.line = at;
     auto& report = out_.report.sites[m.site];
     if (m.range_m == 0) {  // the radio's way to say that there was no answer (5.2)
-      count("zero range", {at, column, "a range of zero is the radio's way to say: no answer"});
+      count("zero range", {at, column, "the radio reports a range of zero when an anchor does not answer"});
       ++report.zero;
       return;
     }
@@ -389,7 +389,8 @@ class Importer {
       const std::size_t s = measurements[i].site;
       if (outlier[i]) {
         ++out_.report.sites[s].outliers;
-        count("range off its site's median", {measurements[i].line, {}, metres(measurements[i].range_m)});
+        count("range far from the median of its site",
+              {measurements[i].line, {}, metres(measurements[i].range_m)});
         continue;
       }
       of_site[s].push_back(measurements[i].range_m);

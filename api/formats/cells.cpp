@@ -44,7 +44,7 @@ bool says_nothing(std::string_view cell) {
 std::string wrong_cell_count(std::size_t cells, std::size_t expected, char separator) {
   std::string out = std::to_string(cells) + " cells, the header has " + std::to_string(expected);
   if (separator == ',' && cells > expected)
-    out += " (decimal commas need semicolons or tabs between the cells; else write decimal points)";
+    out += " (with decimal commas, separate the cells by semicolons or tabs; else write decimal points)";
   return out;
 }
 

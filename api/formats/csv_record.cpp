@@ -32,7 +32,7 @@ Result<std::string_view> CsvRecord::quoted(std::string_view& text) {
     end = whole.find('"', end + 2);
   }
   if (end == std::string_view::npos)
-    return make_error(Errc::bad_frame, "a quote that is not closed: " + to_utf8(text, k_most_shown));
+    return make_error(Errc::bad_frame, "a quote is not closed: " + to_utf8(text, k_most_shown));
   const std::string_view inside = whole.substr(0, end);
   text.remove_prefix(end + 2);
   if (!doubled) return inside;
@@ -69,7 +69,7 @@ Result<bool> CsvRecord::take(std::string_view& text) {
     }
     if (take_line_end(text)) return true;
     if (text.front() != form_.separator)
-      return make_error(Errc::bad_frame, "text behind a closing quote: " + to_utf8(text, k_most_shown));
+      return make_error(Errc::bad_frame, "text after a closing quote: " + to_utf8(text, k_most_shown));
     text.remove_prefix(1);
     // A separator at the very end has an empty cell behind it.
     if (text.empty()) {
@@ -83,7 +83,7 @@ Result<void> CsvRecord::read(std::string_view line) {
   std::string_view rest = line;
   BOOST_OUTCOME_TRY(const bool any, take(rest));
   if (!any) cells_.push_back(line);
-  if (!rest.empty()) return make_error(Errc::bad_frame, "a line end within a line");
+  if (!rest.empty()) return make_error(Errc::bad_frame, "a line end inside a line");
   return boost::outcome_v2::success();
 }
 

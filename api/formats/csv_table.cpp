@@ -15,11 +15,11 @@ Result<CsvTable> CsvTable::open(const std::filesystem::path& folder, const std::
   const bool has_packed = std::filesystem::exists(packed, ignored);
   if (!has_plain && !has_packed) {
     return make_error(Errc::not_found,
-                      folder.string() + ": neither " + stem + ".csv nor " + stem + ".csv.gz is there");
+                      folder.string() + ": neither " + stem + ".csv nor " + stem + ".csv.gz exists");
   }
   if (has_plain && has_packed) {
     return make_error(Errc::invalid_argument, folder.string() + ": both " + stem + ".csv and " + stem +
-                                                  ".csv.gz are there; which is meant?");
+                                                  ".csv.gz exist: remove one of them");
   }
   const auto& file = has_plain ? plain : packed;
   BOOST_OUTCOME_TRY(auto lines, api::GzipLines::open(file));

@@ -154,7 +154,7 @@ Result<void> read_track(const std::filesystem::path& folder, const FlightDeclara
   BOOST_OUTCOME_TRY(const auto pose, PoseColumns::of(table, flight));
   note_unknown(table, "track", {}, flight, data);
   if (!pose.has_fix_class() && (flight.mission.frame == TrackFrame::wgs84 || flight.source)) {
-    data.notes.push_back("track: no column fix, every position is taken as RTK fixed");
+    data.notes.push_back("track: no column fix, every position is used as RTK fixed");
   }
   std::size_t not_finite = 0;
   while (true) {
@@ -169,7 +169,8 @@ Result<void> read_track(const std::filesystem::path& folder, const FlightDeclara
     }
   }
   if (not_finite > 0)
-    data.notes.push_back("track: " + std::to_string(not_finite) + " rows without a finite pose left out");
+    data.notes.push_back("track: " + std::to_string(not_finite) +
+                         " rows without a finite pose were left out");
   return boost::outcome_v2::success();
 }
 
@@ -217,7 +218,7 @@ Result<void> read_ranges(const std::filesystem::path& folder, const FlightDeclar
     }
     BOOST_OUTCOME_TRY(const auto antenna_number, table.number(antenna));
     if (antenna_number) {
-      if (!(*antenna_number >= 0 && *antenna_number <= 255)) return table.error("antenna is not 0 to 255");
+      if (!(*antenna_number >= 0 && *antenna_number <= 255)) return table.error("antenna must be 0 to 255");
       range.antenna = static_cast<std::uint8_t>(*antenna_number);
     } else if (!tag && !tags.empty()) {
       range.antenna = tags.front().antenna;
@@ -231,10 +232,11 @@ Result<void> read_ranges(const std::filesystem::path& folder, const FlightDeclar
     if (what == "anchor_anchor") {
       if (!tag)
         return table.error(
-            "a range between anchors names the other one in tag_id, and there is no such column");
+            "a range between anchors needs the other anchor in the column tag_id, and there is no such "
+            "column");
       range.kind = RangeKind::anchor_anchor;
     } else if (!what.empty() && what != "tag_anchor") {
-      return table.error("kind is tag_anchor or anchor_anchor");
+      return table.error("kind must be tag_anchor or anchor_anchor");
     }
     if (pose && range.kind == RangeKind::tag_anchor) {
       BOOST_OUTCOME_TRY(const auto fix, pose->read(table, range.time));

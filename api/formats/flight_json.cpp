@@ -37,7 +37,7 @@ class Reader {
     const Json* value = find(key);
     if (value && value->is_string()) return value->get<std::string>();
     if (value && value->is_number_integer()) return std::to_string(value->get<long long>());
-    if (value) fail("'" + std::string(key) + "' is not a text");
+    if (value) fail("'" + std::string(key) + "' is not a string");
     if (!value && required) fail("key '" + std::string(key) + "' is missing");
     return {};
   }
@@ -83,7 +83,7 @@ void read_track(Reader r, FlightDeclaration& flight, const std::string& file, st
     r.fail("'frame' is '" + frame + "', expected one of " + list_of(k_frame_words.words()) + ", crs");
   }
   if (!flight.source && (r.find("crs") || r.find("heights") || r.find("max_datum_error_m")))
-    r.fail("'crs', 'heights' and 'max_datum_error_m' are of the frame crs");
+    r.fail("'crs', 'heights' and 'max_datum_error_m' are only for the frame crs");
   const std::string point = r.text("point", true);
   if (const auto known = k_point_words.find(point)) {
     flight.mission.point = *known;
@@ -161,10 +161,9 @@ Result<FlightDeclaration> read_flight_json(const std::filesystem::path& file) {
         Errc::not_found,
         file.string() + (std::filesystem::exists(file, ignored)
                              ? ": cannot be opened"
-                             : ": not there. A flight folder has flight.json, ranges.csv and track.csv "
-                               "(docs/formats.md); tables of other programs: --track and --ranges, or Import "
-                               "a flight in the "
-                               "dashboard"));
+                             : ": does not exist. A flight folder has flight.json, ranges.csv and track.csv "
+                               "(docs/formats.md); for tables of other programs use --track and --ranges, or "
+                               "Import a flight in the dashboard"));
   }
   constexpr std::size_t k_max_bytes = 1 << 20;
   std::string text(k_max_bytes + 1, '\0');

@@ -128,28 +128,29 @@ std::string listed(const std::vector<std::string>& names) {
 std::string words_of(const std::string& need, const ForeignTable& track, const ForeignTable& ranges,
                      const Reading& r) {
   const std::string column_option = " (have: " + listed(track.columns()) + "): --column track.";
-  if (need == k_needs_tag) return "no column is the tag: --tag 0x6e01, or --column ranges.tag=NAME";
+  if (need == k_needs_tag) return "no column has the tag: give --tag 0x6e01, or --column ranges.tag=NAME";
   if (need == k_needs_fix)
     return track.name() + ": 1 and 2 in '" + std::string(column_of(r.tc, "fix")) +
-           "' mean other things to each program: --fix-numbers solution, nmea, rtklib or mavlink";
+           "' have different meanings in different programs: give --fix-numbers solution, nmea, rtklib or "
+           "mavlink";
   if (need == k_needs_degrees)
     return track.name() +
-           ": the columns of latitude and longitude hold no degrees: --column track.x=NAME, "
+           ": the columns of latitude and longitude are not in degrees: --column track.x=NAME, "
            "track.y, track.z and --crs EPSG:CODE of the map";
   if (need == k_needs_crs)
     return track.name() + ": x, y, z are " + k_of_a_map + ": --crs EPSG:25832, UTM 32N or ECEF";
   if (need == k_needs_heights)
-    return track.name() + ": nothing says what the heights in '" +
+    return track.name() + ": it is not stated what the heights in '" +
            std::string(column_of(r.tc, r.local ? "z" : "height")) +
            "' are above: --heights ellipsoidal, EPSG:5773 (mean sea level, EGM96), metres of the geoid "
            "there, or "
            "column with --column track.separation=NAME";
   if (need == k_needs_time_of_ranges || need == "anchor" || need == "range") {
     const std::string field = need == k_needs_time_of_ranges ? "time" : need;
-    return ranges.name() + ": no column is known as the " + field + " (have: " + listed(ranges.columns()) +
+    return ranges.name() + ": no column was found for the " + field + " (have: " + listed(ranges.columns()) +
            "): --column ranges." + field + "=NAME" + (need == "range" ? ", or --column-for-each-anchor" : "");
   }
-  return track.name() + ": no column is known as " + need + column_option + need + "=NAME";
+  return track.name() + ": no column was found for " + need + column_option + need + "=NAME";
 }
 
 Result<void> check_columns(const ForeignTable& table, const ForeignColumns& columns, const char* of) {
@@ -189,7 +190,7 @@ std::string row_text(const ForeignTable& table, std::size_t row, const std::stri
   return table.name() + " row " + std::to_string(row + 2) + ": " + what;
 }
 std::string no_time(std::string_view cell) {
-  return '"' + to_utf8(cell, 40) + "\" is no time that is known (2026-05-04 10:00:01.5)";
+  return '"' + to_utf8(cell, 40) + "\" is not a time that can be read (like 2026-05-04 10:00:01.5)";
 }
 
 /// Reads positions of one table.
@@ -236,9 +237,10 @@ class TrackReader {
   /// What can be no place of this kind; looked at in each row, for the first ones may look otherwise.
   std::string wrong_place(const std::optional<Eigen::Vector3d>& at) const {
     // Both zero is what a receiver without a fix writes.
-    if (!at || (!own_frame_ && at->x() == 0 && at->y() == 0)) return "no place";
+    if (!at || (!own_frame_ && at->x() == 0 && at->y() == 0)) return "no position";
     if (!reading_.local)
-      return std::abs(at->x()) > 180 || std::abs(at->y()) > 90 ? "latitude or longitude is no degrees" : "";
+      return std::abs(at->x()) > 180 || std::abs(at->y()) > 90 ? "latitude or longitude is not in degrees"
+                                                               : "";
     return own_frame_ && is_of_a_map(*at)
                ? "x, y, z are more than 100 km from zero: a coordinate system is needed"
                : "";
@@ -303,7 +305,7 @@ Result<void> read_ranges(const ForeignTable& table, const Reading& reading, cons
       const auto& other = names.try_emplace(id.id, who).first->second;
       if (other != who)
         return make_error(Errc::invalid_argument, "the names \"" + who + "\" and \"" + other +
-                                                      "\" give one address: rename one of them");
+                                                      "\" give the same address: rename one of them");
     }
     out.data.anchor_names.try_emplace(id.id, who);
     Range range;
@@ -370,10 +372,10 @@ Result<std::optional<SourceCrsSpec>> source_of(const Reading& r, double max_datu
 void add_notes(const ForeignTable& track, const Reading& r, ForeignFlight& out) {
   auto& notes = out.data.notes;
   if (!r.tc.contains("fix"))
-    notes.push_back(track.name() + ": no column is the fix class, every position is taken as RTK fixed");
+    notes.push_back(track.name() + ": no column is the fix class, every position is used as RTK fixed");
   for (const auto& [word, n] : out.unknown_fix)
     notes.push_back(track.name() + ": " + std::to_string(n) + " positions have the fix class \"" + word +
-                    "\", which is not known: they count as no fix");
+                    "\", which is unknown: they count as no fix");
   if (!out.refused.empty())
     notes.push_back(std::to_string(out.refused.size()) + " rows left out, the first: " + out.refused.front());
   if (out.data.fixes.empty() || out.data.ranges.empty()) return;
@@ -384,8 +386,9 @@ void add_notes(const ForeignTable& track, const Reading& r, ForeignFlight& out) 
   if (2 * static_cast<std::size_t>(outside) > out.data.ranges.size())
     notes.push_back(std::to_string(outside) + " of " + std::to_string(out.data.ranges.size()) +
                     " ranges are outside the time of the track, " + to_rfc3339(first->time) + " to " +
-                    to_rfc3339(last->time) + "; the first range is of " +
-                    to_rfc3339(out.data.ranges.front().time) + ": 18 s apart is GPS time");
+                    to_rfc3339(last->time) + "; the first range is at " +
+                    to_rfc3339(out.data.ranges.front().time) +
+                    ": if they are 18 s apart, one of them is in GPS time");
 }
 
 }  // namespace
@@ -434,7 +437,7 @@ Result<FlightData> read_foreign_flight(const std::optional<ForeignTable>& track,
     const auto anchors = ranges.number_columns(claimed);
     if (anchors.empty())
       return make_error(Errc::invalid_argument,
-                        ranges.name() + ": no column of numbers is left for an anchor");
+                        ranges.name() + ": no column of numbers is left for the anchors");
     ranges = std::move(ranges).with_a_row_for_each_range(anchors);
   }
   const ForeignTable& positions = track ? *track : ranges;
@@ -443,7 +446,7 @@ Result<FlightData> read_foreign_flight(const std::optional<ForeignTable>& track,
   auto& flight = read.value();
   if (flight.data.fixes.empty() || flight.data.ranges.empty())
     return make_error(Errc::invalid_argument, flight.refused.empty()
-                                                  ? "there is not one position and one range in it"
+                                                  ? "it does not contain a position and a range"
                                                   : flight.refused.front());
   if (flight.source) {
     const auto put = put_on_globe(flight.data, *flight.source, AttitudeOf::true_north);

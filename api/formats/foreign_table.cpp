@@ -144,7 +144,7 @@ Result<ForeignTable> ForeignTable::read(const std::filesystem::path& file) {
   const bool whole = gzclose_r(in) == Z_OK && got == 0;
   if (bytes.size() > k_max_bytes)
     return make_error(Errc::invalid_argument, file.string() + ": more than 1 GiB of text");
-  if (!whole) return make_error(Errc::invalid_argument, file.string() + ": cannot be read to its end");
+  if (!whole) return make_error(Errc::invalid_argument, file.string() + ": cannot be read completely");
   return parse(file.string(), bytes);
 }
 
@@ -156,7 +156,7 @@ Result<ForeignTable> ForeignTable::parse(std::string name, std::string_view byte
   if (table.cells_.empty()) return table.error(": a header line and at least one row are needed");
   const auto is_number = [&](const std::string& c) { return std::isfinite(table.number(c)); };
   if (std::ranges::all_of(table.columns_, is_number))
-    return table.error(": the first line is numbers, a header line of names is needed");
+    return table.error(": the first line has numbers; a header line with names is needed");
   for (auto c = table.columns_.begin(); c != table.columns_.end(); ++c) {
     if (!c->empty() && std::find(std::next(c), table.columns_.end(), *c) != table.columns_.end())
       return table.error(": two columns have the name \"" + *c + '"');

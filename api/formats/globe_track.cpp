@@ -51,12 +51,13 @@ Result<void> put_on_globe(FlightData& flight, const SourceCrsSpec& spec, Attitud
     return false;
   });
   if (flight.fixes.empty())
-    return make_error(Errc::invalid_argument, "not one position of the track lies within " + crs.name());
+    return make_error(Errc::invalid_argument, "no position of the track is within " + crs.name());
   const bool turned =
       std::ranges::any_of(flight.fixes, [](const Fix& fix) { return fix.enu_from_body.has_value(); });
   if (crs.geocentric() && turned && attitude == AttitudeOf::axes)
-    return make_error(Errc::invalid_argument,
-                      "attitudes of earth-centred axes are not read: give headings from true north, or none");
+    return make_error(
+        Errc::invalid_argument,
+        "attitudes in earth-centred axes are not supported: give headings from true north, or none");
   flight.mission.frame = TrackFrame::wgs84;
   flight.notes.push_back(note_of(crs, flight.fixes.front().position, convergence_rad));
   if (n_outside > 0)

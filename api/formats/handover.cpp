@@ -39,8 +39,8 @@ void hold_against_sums(const ZipReader& zip, const std::vector<PackSum>& sums, P
     if (!found)
       verdict.faults.push_back(found.error().message);
     else if (found.value() != sum.sha256_hex)
-      verdict.faults.push_back(name + " differs: its SHA-256 is " + found.value() + ", the list says " +
-                               to_utf8(sum.sha256_hex));
+      verdict.faults.push_back(name + " was changed: its SHA-256 is " + found.value() +
+                               ", in the list it is " + to_utf8(sum.sha256_hex));
   }
   for (const auto& entry : zip.entries()) {
     if (!named.contains(entry.name)) verdict.faults.push_back(entry.name + " is not in the list");
@@ -66,7 +66,7 @@ void hold_signature(const ZipReader& zip, std::string_view sums, const std::opti
   if (!signature)
     verdict.faults.push_back(std::string(k_pack_signature) + ": " + signature.error().message);
   else if (!key->verifies(sums, signature.value()))
-    verdict.faults.push_back("the signature is not one of key " + verdict.key_id + " over " +
+    verdict.faults.push_back("the signature does not match key " + verdict.key_id + " over " +
                              std::string(k_pack_sums));
 }
 
@@ -88,7 +88,7 @@ Result<PackVerdict> verify_pack(const std::filesystem::path& file, const std::op
     BOOST_OUTCOME_TRY(const std::string text, zip.text(k_pack_sums, k_small_bytes));
     const auto sums = read_sums(text);
     if (!sums)
-      verdict.faults.push_back(std::string(k_pack_sums) + " is no list of checksums");
+      verdict.faults.push_back(std::string(k_pack_sums) + " is not a list of checksums");
     else
       hold_against_sums(zip, *sums, verdict);
     hold_signature(zip, text, key, verdict);
@@ -104,7 +104,8 @@ Result<PackVerdict> verify_pack(const std::filesystem::path& file, const std::op
     verdict.faults.push_back(manifest.error().message);
   else
     verdict.n_files = manifest.value().entries.size();
-  if (key) verdict.faults.emplace_back("a flight bundle alone has no signature: give the hand-over pack");
+  if (key)
+    verdict.faults.emplace_back("a flight bundle has no signature of its own: give the hand-over pack");
   return verdict;
 }
 

@@ -175,7 +175,7 @@ class Reader {
     if (kind == Kind::no_fly) {
       plan.no_fly.push_back(std::move(area));
     } else if (kind == Kind::fence) {
-      if (!plan.fence.empty()) return fail("conflict", "a second fence: a plan has one");
+      if (!plan.fence.empty()) return fail("conflict", "a second fence: a plan can have only one");
       plan.fence = std::move(area);
     } else if (plan.outline.empty()) {
       plan.outline = std::move(area);
@@ -185,9 +185,8 @@ class Reader {
         plan.building_height_m = *roof;
     } else {
       fail("conflict",
-           "a second building outline: call other areas no-fly or fence, by their name, their folder or a "
-           "data "
-           "field kind");
+           "a second building outline: mark other areas as no-fly or fence by their name, their folder or a "
+           "data field kind");
     }
   }
 
@@ -197,10 +196,11 @@ class Reader {
     const auto mode = child_text(node, "altitudeMode");
     for (const auto& place : *all) {
       if (mode != "relativeToGround" || !place.height_m) {
-        return fail("required",
-                    mode == "absolute"
-                        ? "heights above sea level say nothing without the ground: use relativeToGround"
-                        : "a waypoint needs altitudeMode relativeToGround and a height as third coordinate");
+        return fail(
+            "required",
+            mode == "absolute"
+                ? "heights above sea level cannot be used without the ground height: use relativeToGround"
+                : "a waypoint needs altitudeMode relativeToGround and a height as third coordinate");
       }
       if (!(*place.height_m >= 0 && *place.height_m <= 500))
         return fail("out_of_range", "the height above ground must be 0 to 500 m");
@@ -236,13 +236,14 @@ Plan read_kml_plan(std::string_view text, std::vector<std::string>& notes, std::
   Reader reader(notes, errors);
   reader.walk(root, Kind::unsaid);
   if (reader.n_placemarks() == 0 && errors.empty())
-    errors.push_back({"", "required", "the file has no Placemark: nothing is drawn in it"});
+    errors.push_back({"", "required", "the file has no Placemark: it contains no drawing"});
   return std::move(reader.plan);
 }
 
 Plan read_plan_file(std::string_view text, std::vector<std::string>& notes, std::vector<FieldError>& errors) {
   if (text.starts_with("PK")) {
-    errors.push_back({"", "unknown_value", "this is a KMZ archive: unpack it and send the doc.kml inside"});
+    errors.push_back(
+        {"", "unknown_value", "this is a KMZ archive: unpack it and send the file doc.kml in it"});
     return {};
   }
   const auto first = text.find_first_not_of(" \t\r\n\xEF\xBB\xBF");

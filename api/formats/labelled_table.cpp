@@ -161,7 +161,7 @@ class Reader {
         joins.push_back(header_.of(name));
         if (joins.back() == k_none)
           return make_error(Errc::not_found,
-                            file_ + ": the CIR table is joined by column " + name + ", which is not there");
+                            file_ + ": the CIR table is joined by column " + name + ", which does not exist");
       }
     }
     while (true) {
@@ -364,7 +364,7 @@ class Reader {
     if (range_ != k_none && !(range > 0))
       return drop(header_.names[range_] + (std::isnan(range) ? lacks(cells[range_]) : " not above zero"),
                   line);
-    if (range > 1e4) return drop(header_.names[range_] + " beyond 10 km", line);
+    if (range > 1e4) return drop(header_.names[range_] + " above 10 km", line);
     // A class needs no true range: whoever asks for a bias leaves rows without one out.
     std::optional<double> truth;
     if (truth_ != k_none && !says_nothing(cells[truth_])) {
@@ -463,7 +463,7 @@ class Reader {
 
 Result<LabelledTable> read_labelled_tables(std::span<const std::filesystem::path> paths,
                                            const TableOptions& options) {
-  if (paths.empty()) return make_error(Errc::invalid_argument, "no data file given");
+  if (paths.empty()) return make_error(Errc::invalid_argument, "no data file is given");
   std::optional<CirTable> cir;
   if (options.cir) {
     BOOST_OUTCOME_TRY(cir, read_cir(*options.cir));

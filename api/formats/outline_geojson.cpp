@@ -153,7 +153,7 @@ class Reader {
   void read_properties(const Json& properties, const std::string& at, Area& area) {
     const std::string base = at.substr(0, at.rfind('/')) + "/properties/";
     if (const auto kind = properties.find("kind"); kind != properties.end() && !kind->is_null()) {
-      if (!kind->is_string()) return fail(base + "kind", "wrong_type", "must be a text");
+      if (!kind->is_string()) return fail(base + "kind", "wrong_type", "must be a string");
       area.kind = kind->get<std::string>();
     }
     if (const auto height = properties.find("height_m"); height != properties.end() && !height->is_null()) {

@@ -176,7 +176,7 @@ void read_covariance(Fields& fields, planning::PlannedAnchor& anchor) {
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(m, Eigen::EigenvaluesOnly);
   if (!(eigen.eigenvalues()[0] > 0)) {
     fields.error("covariance_m2", "out_of_range",
-                 "is no covariance (ee, en, eu, nn, nu, uu must be positive definite)");
+                 "is not a covariance (ee, en, eu, nn, nu, uu must be positive definite)");
     return;
   }
   anchor.covariance_m2 = m;
@@ -195,7 +195,7 @@ void read_measured_at(Fields& fields, std::size_t n_visited, planning::PlannedAn
     const auto& index = (*value)[i];
     if (!index.is_number_unsigned() || index.get<std::uint64_t>() >= n_visited) {
       fields.error("measured_at", "out_of_range",
-                   "index " + std::to_string(i) + " names none of the " + std::to_string(n_visited) +
+                   "index " + std::to_string(i) + " is not one of the " + std::to_string(n_visited) +
                        " visited points");
       return;
     }
@@ -213,7 +213,7 @@ planning::PlannedAnchor read_anchor(const Json& value, const std::string& at, Re
     const Json* position = place_fields.child("position_m");
     take(probability, place_fields.number("probability", 0, 1));
     if (position == nullptr)
-      return place_fields.error("position_m", "required", "where the anchor is thought to be");
+      return place_fields.error("position_m", "required", "where the anchor is assumed to be");
     if (const auto p = reader.point(*position, place_fields.pointer("position_m"))) {
       anchor.places.push_back({*p, probability});
     }

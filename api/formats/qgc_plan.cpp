@@ -103,7 +103,7 @@ std::optional<Item> read_item(const Json& json, const std::string& at, std::vect
                               std::vector<FieldError>& errors) {
   const Json* type = member(json, "type");
   if (type != nullptr && *type != "SimpleItem") {
-    notes.push_back(at + " is a complex item (a survey or the like) and was left out");
+    notes.push_back(at + " is a complex item (such as a survey) and was left out");
     return std::nullopt;
   }
   const Json *command = member(json, "command"), *frame = member(json, "frame"),
@@ -129,7 +129,7 @@ void read_waypoint(const Item& item, const std::string& at, double home_m, Plan&
   w.height_m = p[6].get<double>() - (item.frame == k_frame_msl ? home_m : 0);
   if (item.frame != k_frame_msl && item.frame != k_frame_relative) {
     return fail(errors, at + "/frame", "unknown_value",
-                "altitudes must be relative to home (3) or above sea level (0)");
+                "altitudes must be relative to home (frame 3) or above sea level (frame 0)");
   }
   if (!(w.height_m >= 0 && w.height_m <= 500)) {
     return fail(errors, at + "/params/6", "out_of_range", "the height above home must be 0 to 500 m");

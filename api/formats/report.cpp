@@ -96,7 +96,7 @@ std::string accuracy(const Report& r) {
   out += "<div><p><b>Two accuracies.</b> The first is to the base station. The second adds the base";
   out += base ? ", with σ " + fixed(*r.site->base_sigma_m * 1000, 0) + " mm" +
                     (r.site->crs_frame.empty() ? "" : " in " + html_text(r.site->crs_frame)) + ".</p></div>"
-              : ", whose own uncertainty nobody stated.</p></div>";
+              : ", whose own uncertainty is not stated.</p></div>";
   return out + "</div>";
 }
 
@@ -149,16 +149,15 @@ std::string report_html(const Report& r) {
   out += "<section class=\"sheet\">" + top(r) + facts(r) + "<div class=\"fig\">" + report::map(r) +
          accuracy(r) + "</div>\n";
   out += report::positions(r);
-  out += "<div class=\"cols\">" + sentences("How it was done", r.methods) +
-         sentences("What to know", r.remarks) + "</div>";
+  out += "<div class=\"cols\">" + sentences("Method", r.methods) + sentences("Remarks", r.remarks) + "</div>";
   out +=
       "<div class=\"sig\"><div><span class=\"lab\">Flown by</span></div><div><span class=\"lab\">Checked "
       "by</span></div><div><span class=\"lab\">Accepted by, date</span></div></div>";
-  out += footer(r, "evidence overleaf") + "</section>\n";
+  out += footer(r, "evidence on the next page") + "</section>\n";
   out += "<section class=\"sheet\">" + report::gates(r) + report::goals(r) + report::budgets(r) +
          report::methods(r) + report::rejected(r) + report::flights(r) + report::iterations(r) +
-         report::residual_plots(r) + "<div style=\"margin-top:auto\"></div>" +
-         footer(r, "end of the report") + "</section>\n</body></html>\n";
+         report::residual_plots(r) + "<div style=\"margin-top:auto\"></div>" + footer(r, "end of report") +
+         "</section>\n</body></html>\n";
   return out;
 }
 

@@ -93,10 +93,10 @@ struct GateWords {
   bool least{false};  ///< the value has to be at least the limit; else at most
 };
 constexpr std::array k_gate_words{
-    GateWords{"redundancy", "Ranges beyond the unknowns", "", true},
+    GateWords{"redundancy", "Number of ranges minus unknowns", "", true},
     GateWords{"rejected", "Ranges rejected", "%"},
-    GateWords{"geometry", "Width of the track for its distance", "%", true},
-    GateWords{"precision", "Largest σ for its distance", "%"},
+    GateWords{"geometry", "Width of the track relative to the distance", "%", true},
+    GateWords{"precision", "Largest σ relative to the distance", "%"},
     GateWords{"side", "The mirror solution is excluded", "%", true},
     GateWords{"outline", "Outside the outline of the building", "m"},
     GateWords{"blocked", "Residuals against those of the other anchors", "×"},
@@ -104,14 +104,14 @@ constexpr std::array k_gate_words{
     GateWords{"chi_square", "Residuals average out over time", "χ²"},
     GateWords{"halves", "The two halves of the flight agree", "χ²"},
     GateWords{"flights", "The flights agree", "χ²"},
-    GateWords{"moved", "It is where it was", "χ²"},
+    GateWords{"moved", "Same position as before", "χ²"},
     GateWords{"bias", "Range bias of the kit, σ", "m"},
     GateWords{"lever_arm", "The lever arm fits the flight", "σ"},
-    GateWords{"unseen_arm", "Error that a wrong lever arm would cause unseen", "m"},
-    GateWords{"track_shift", "The track came back from its gaps where it was", "χ²"},
-    GateWords{"track", "Positions off the others as a whole", "%"},
-    GateWords{"profile", "The kit is as its other flights found it", "χ²"},
-    GateWords{"settled", "Rounds until the joint solution settled", ""},
+    GateWords{"unseen_arm", "Undetected error that a wrong lever arm would cause", "m"},
+    GateWords{"track_shift", "No shift of the track at its gaps", "χ²"},
+    GateWords{"track", "Positions shifted together against the others", "%"},
+    GateWords{"profile", "The kit agrees with its other flights", "χ²"},
+    GateWords{"settled", "Rounds until the joint solution converged", ""},
     GateWords{"target_sigma_m", "σ of the position", "m"},
     GateWords{"goal_h95_m", "95 % horizontal", "m"},
     GateWords{"goal_v95_m", "95 % vertical", "m"},
@@ -172,14 +172,14 @@ std::string positions(const Report& report) {
   out += "</tr></thead><tbody>";
   for (const auto& anchor : report.anchors) out += position_row(report, anchor);
   out += "</tbody></table><p class=\"note\">";
-  out += globe ? "Height is ellipsoidal." : "Coordinates of the flights' own local frame.";
+  out += globe ? "Height is ellipsoidal." : "Coordinates in the local frame of the flights.";
   if (any_truth(report))
-    out += " Error is the distance to the truth that was given, in the plane where that has no height.";
+    out += " Error is the distance to the given true position, horizontal where that has no height.";
   for (const auto& anchor : report.anchors) {
     if (anchor.overridden)
       out += " <b>" + html_text(name_of(anchor)) + "</b> was published by " +
              html_text(anchor.overridden->by.empty() ? "an unnamed user" : anchor.overridden->by) +
-             " in spite of its gates, because: " + html_text(anchor.overridden->reason) + ".";
+             " although a gate failed; reason: " + html_text(anchor.overridden->reason) + ".";
     else if (!anchor.published && !anchor.estimate.acceptable() && anchor.estimate.best)
       out += " " + html_text(name_of(anchor)) + " is withheld: " +
              html_text(anchor.estimate.reason.empty() ? failures(anchor) : anchor.estimate.reason) + ".";
@@ -190,15 +190,14 @@ std::string positions(const Report& report) {
 std::string gates(const Report& report) {
   const auto names = gate_names(report);
   if (names.empty())
-    return "<h2>Acceptance gates</h2><p class=\"note\">This calibration was made without gates; nothing of "
-           "it is "
-           "accepted without a person.</p>";
+    return "<h2>Acceptance gates</h2><p class=\"note\">This calibration was made without gates; a person "
+           "must accept each of its anchors.</p>";
   std::string out = "<h2>Acceptance gates</h2>";
   // A gate a row and a few anchors beside each other: so it fits the page, however many there are of either.
   for (std::size_t from = 0; from < report.anchors.size(); from += k_gate_columns) {
     const auto some =
         std::span(report.anchors).subspan(from, std::min(k_gate_columns, report.anchors.size() - from));
-    out += "<table class=\"gates\"><thead><tr>" + head("What is asked", false) + head("Limit");
+    out += "<table class=\"gates\"><thead><tr>" + head("Condition", false) + head("Limit");
     for (const auto& anchor : some) out += head(html_text(name_of(anchor)));
     out += "</tr></thead><tbody>";
     for (const auto& name : names) out += gate_row(some, name);
@@ -209,7 +208,8 @@ std::string gates(const Report& report) {
     const std::string why = failures(anchor);
     if (!why.empty()) words += " <b>" + html_text(name_of(anchor)) + "</b> " + html_text(why) + ".";
   }
-  return out + "<p class=\"note\">✕ failed. Only an anchor that passes all is accepted without a person." +
+  return out +
+         "<p class=\"note\">✕ failed. Only an anchor that passes all gates is accepted without a person." +
          words + "</p>";
 }
 
@@ -230,11 +230,10 @@ std::string goals(const Report& report) {
   }
   if (rows.empty()) return {};
   return "<h2>Accuracy goal</h2><table class=\"goals\"><thead><tr>" + head("Anchor", false) +
-         head("Goal", false) + head("Accuracy", false) + head("Whose goal", false) + "</tr></thead><tbody>" +
+         head("Goal", false) + head("Accuracy", false) + head("Goal from", false) + "</tr></thead><tbody>" +
          rows +
-         "</tbody></table><p class=\"note\">Whether it is accurate enough. It decides nothing about "
-         "acceptance: "
-         "the gates do.</p>";
+         "</tbody></table><p class=\"note\">Shows whether an anchor is accurate enough. Acceptance is "
+         "decided by the gates alone.</p>";
 }
 
 std::string methods(const Report& report) {
@@ -254,7 +253,7 @@ std::string methods(const Report& report) {
   }
   if (rows.empty()) return {};
   return "<h2>Methods compared</h2><p class=\"note\">Distance to " +
-         std::string(truth ? "the truth" : "the joint answer") +
+         std::string(truth ? "the truth" : "the joint solution") +
          ", m. Linear: eq 7.2 to 7.5, closed form. Weighted: eq 7.10, each anchor alone, weights of 7.2.3. "
          "Joint: "
          "all anchors with bias, range curve, lag and arms, robust.</p><table><thead><tr>" +
@@ -281,9 +280,8 @@ std::string budgets(const Report& report) {
   std::string out = "<h2>Error budget</h2><table><thead><tr>" + head("Anchor", false);
   for (const auto& source : sources) out += head(html_text(source_words(source)));
   return out + head("What would help most", false) + "</tr></thead><tbody>" + rows +
-         "</tbody></table><p class=\"note\">Shares of the covariance's trace: what goes when the source is "
-         "known "
-         "perfectly.</p>";
+         "</tbody></table><p class=\"note\">Shares of the covariance's trace: the part that would vanish if "
+         "the source were known perfectly.</p>";
 }
 
 std::string rejected(const Report& report) {
@@ -364,10 +362,11 @@ std::string iterations(const Report& report) {
   }
   if (plots.empty()) return {};
   const char* against = truth ? "the truth" : "the final position";
-  return "<h2>Error per iteration, raw against corrected</h2><p class=\"note\">Distance to " +
+  return "<h2>Error per iteration, raw and corrected</h2><p class=\"note\">Distance to " +
          std::string(against) +
-         " after each further part of the flight; beside it the error of that part's middle range, and below "
-         "it what a model predicted of most of them (L line of sight, N not line of sight, – no prediction). "
+         " after each further part of the flight; beside it the error of the median range of that part, and "
+         "below it the class that a model predicted for most of its ranges (L line of sight, N not line of "
+         "sight, – no prediction). "
          "<i class=\"key\" "
          "style=\"color:var(--caution)\"></i><span>raw "
          "ranges</span><i class=\"key\" style=\"color:var(--info)\"></i><span>corrected</span><i "
@@ -392,8 +391,9 @@ std::string residual_plots(const Report& report) {
     plots += "<div><h3>" + html_text(name_of(anchor)) + "</h3>" + residuals(rows) + "</div>";
   }
   if (plots.empty()) return {};
-  return "<h2>Residuals, m, over time</h2><p class=\"note\">Corrected range less distance; · used, <span "
-         "class=\"bad\">×</span> rejected. A pattern that stays is an error of the model, not noise.</p><div "
+  return "<h2>Residuals, m, over time</h2><p class=\"note\">Corrected range minus distance; · used, <span "
+         "class=\"bad\">×</span> rejected. A pattern that persists is an error of the model, not "
+         "noise.</p><div "
          "class=\"plots\">" +
          plots + "</div>";
 }

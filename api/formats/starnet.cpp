@@ -94,10 +94,10 @@ std::string head(const Calibration& calibration, const StarnetOptions& options) 
   else
     out += std::string("# Coordinates: y, x, z in metres of the local frame") + k_end;
   for (const char* line :
-       {"# Adjust it as a local 3-D job. F1T1 is the first place of the tag's antenna in flight 1, fixed.",
-        "# Distances are less the range bias of the kit; standard errors are sigma / sqrt(robust weight).",
-        "# Errors of ranges stay alike for seconds: standard errors of an adjustment that takes them as",
-        "# independent are smaller than those of the calibration, which stand beside each anchor."})
+       {"# Adjust it as a local 3-D job. F1T1 is the first position of the tag's antenna in flight 1, fixed.",
+        "# Distances: range bias of the kit subtracted; standard errors are sigma / sqrt(robust weight).",
+        "# Errors of ranges are correlated for seconds: standard errors of an adjustment that takes them as",
+        "# independent are smaller than those of the calibration, which are given at each anchor."})
     out += std::string(line) + k_end;
   return out + ".3D" + k_end + ".UNITS Meters" + k_end + ".ORDER NE" + k_end + ".DELTA OFF" + k_end;
 }
@@ -139,10 +139,9 @@ bool has_observations(const Evidence& evidence) {
 Result<std::string> starnet_listing(const Calibration& calibration, const Evidence& evidence,
                                     const StarnetOptions& options) {
   if (!has_observations(evidence))
-    return make_error(
-        Errc::invalid_argument,
-        "this calibration was made by a version that kept no places of the tag with its ranges: "
-        "calibrate its missions again");
+    return make_error(Errc::invalid_argument,
+                      "this calibration was made by a version that did not store the positions of the tag "
+                      "with its ranges: calibrate its missions again");
   Lines lines;
   for (std::size_t i = 0; i < evidence.flights.size(); ++i) {
     const auto& flight = evidence.flights[i];
@@ -158,9 +157,9 @@ Result<std::string> starnet_listing(const Calibration& calibration, const Eviden
   }
   std::string out = head(calibration, options);
   out += k_end + std::string("# Anchors") + k_end + anchors(calibration, options, lines);
-  out += k_end + std::string("# Places of the tag") + k_end + lines.stations;
+  out += k_end + std::string("# Positions of the tag") + k_end + lines.stations;
   out += k_end + std::string("# Ranges") + k_end + lines.distances;
-  out += k_end + std::string("# Residuals of each flight's own solution: observed less computed") + k_end +
+  out += k_end + std::string("# Residuals of each flight's own solution: observed minus computed") + k_end +
          text("# %-24s %10s %10s %9s %8s %8s %6s %10s %s", "From-To", "observed", "computed", "residual",
               "sigma", "std.res.", "weight", "received", "time") +
          k_end + lines.residuals;

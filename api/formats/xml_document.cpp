@@ -51,9 +51,9 @@ Result<void> read_xml(std::string_view text, pugi::xml_document& document) {
   pugi::xml_node root;
   for (const auto& node : document) {
     const auto fail = [&](const char* what) { return at_line(text, node.offset_debug(), what); };
-    if (node.type() == pugi::node_doctype) return fail("a document type is not read");
+    if (node.type() == pugi::node_doctype) return fail("a document type (DOCTYPE) is not accepted");
     if (node.type() != pugi::node_element) return fail("text outside of the document's element");
-    if (root) return fail("there is more behind the document's end");
+    if (root) return fail("there is text after the end of the document");
     root = node;
   }
   if (!root) return at_line(text, 0, "an element is missing");

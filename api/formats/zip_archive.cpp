@@ -42,7 +42,7 @@ std::string wrong_name(std::string_view name) {
     const auto end = std::min(name.find('/', from), name.size());
     const auto part = name.substr(from, end - from);
     if (part.empty() || part == "." || part == "..")
-      return "the entry " + shown(name) + " is no plain relative name of a file";
+      return "the entry " + shown(name) + " is not a plain relative file name";
     from = end + 1;
   }
   return {};
@@ -60,7 +60,7 @@ std::string wrong_kind(zip_t* archive, zip_uint64_t index, const zip_stat_t& sta
     return "the entry " + shown(name) + " is encrypted";
   if ((stat.valid & ZIP_STAT_COMP_METHOD) != 0 && stat.comp_method != ZIP_CM_STORE &&
       stat.comp_method != ZIP_CM_DEFLATE)
-    return "the entry " + shown(name) + " is packed by another method than deflate";
+    return "the entry " + shown(name) + " is compressed by another method than deflate";
   zip_uint8_t system = 0;
   zip_uint32_t attributes = 0;
   if (zip_file_get_external_attributes(archive, index, 0, &system, &attributes) == 0 &&
@@ -97,7 +97,7 @@ Result<ZipReader> ZipReader::open(const std::filesystem::path& file, const ZipLi
     zip_error_init_with_code(&error, code);
     const std::string why = zip_error_strerror(&error);
     zip_error_fini(&error);
-    return refused("this is no whole zip file: " + why);
+    return refused("this is not a complete zip file: " + why);
   }
   ZipReader reader(std::move(archive));
   zip_t* const zip = reader.archive_->zip;
@@ -117,12 +117,12 @@ Result<ZipReader> ZipReader::open(const std::filesystem::path& file, const ZipLi
       return refused("entry " + std::to_string(i) + " of the zip file cannot be read");
     const std::string name = raw;
     if (auto why = wrong_name(name); !why.empty()) return refused(std::move(why));
-    if (!names.insert(lower(name)).second) return refused("the entry " + shown(name) + " is there twice");
+    if (!names.insert(lower(name)).second) return refused("the entry " + shown(name) + " occurs twice");
     if (auto why = wrong_kind(zip, i, stat, name); !why.empty()) return refused(std::move(why));
     if (stat.size > limits.entry_bytes || (total += stat.size) > limits.total_bytes)
-      return refused("the content is larger than it may be: " + shown(name) + " has " +
-                     std::to_string(stat.size) + " bytes, at most " + std::to_string(limits.entry_bytes) +
-                     " are read of an entry and " + std::to_string(limits.total_bytes) + " of all");
+      return refused("the content is too large: " + shown(name) + " has " + std::to_string(stat.size) +
+                     " bytes, at most " + std::to_string(limits.entry_bytes) + " are read of an entry and " +
+                     std::to_string(limits.total_bytes) + " of all");
     reader.entries_.push_back({name, stat.size});
   }
   if (total > k_ratio_from_bytes && static_cast<double>(total) > limits.ratio * static_cast<double>(packed))
@@ -156,9 +156,9 @@ Result<std::size_t> ZipReader::Stream::read(std::span<char> buffer) {
   const zip_int64_t n = zip_fread(file_->file, buffer.data(), buffer.size());
   if (n < 0)
     return refused("the entry " + shown(file_->name) +
-                   " cannot be read to its end: " + std::string(zip_file_strerror(file_->file)));
+                   " cannot be read completely: " + std::string(zip_file_strerror(file_->file)));
   if (static_cast<std::uint64_t>(n) > file_->left)
-    return refused("the entry " + shown(file_->name) + " is longer than it says");
+    return refused("the entry " + shown(file_->name) + " is longer than stated");
   file_->left -= static_cast<std::uint64_t>(n);
   if (n == 0 && file_->left > 0) return refused("the entry " + shown(file_->name) + " is cut off");
   return static_cast<std::size_t>(n);
@@ -242,7 +242,8 @@ Result<ZipWriter> ZipWriter::create(const std::filesystem::path& file) {
   int code = 0;
   archive->zip = zip_open(file.c_str(), ZIP_CREATE | ZIP_EXCL, &code);
   if (archive->zip == nullptr)
-    return make_error(Errc::storage_unavailable, "cannot make a zip file in " + file.parent_path().string());
+    return make_error(Errc::storage_unavailable,
+                      "cannot create a zip file in " + file.parent_path().string());
   return ZipWriter(std::move(archive));
 }
 

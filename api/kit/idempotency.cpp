@@ -74,7 +74,7 @@ Idempotency::Room Idempotency::make_room(const std::string& who, Keeps keeps) {
   const AnswerUse use = use_of(who);
   if (use.count < k_max_answers && use.bytes < k_max_bytes) return {};
   if (keeps == Keeps::answer) {
-    return {true, "this token has " + std::to_string(use.count) + " kept answers of " +
+    return {true, "this token has " + std::to_string(use.count) + " stored answers of " +
                       std::to_string(use.bytes) + " bytes of the last 24 h (limits " +
                       std::to_string(k_max_answers) + " and " + std::to_string(k_max_bytes) +
                       "): send the request without Idempotency-Key, or later"};
@@ -99,7 +99,7 @@ void Idempotency::keep(const Request& request, const Response& response, std::st
   if (response.body.size() <= k_max_answer_bytes) {
     answer.body = response.body;
   } else {
-    answer.body = R"({"replayed":true,"detail":"done by the first request; its answer of )" +
+    answer.body = R"({"replayed":true,"detail":"the first request was carried out; its answer of )" +
                   std::to_string(response.body.size()) + " bytes was not kept (limit " +
                   std::to_string(k_max_answer_bytes) + R"(): read the resource itself"})";
   }
@@ -148,7 +148,7 @@ Response Idempotency::run(Request& request, Keeps keeps, const std::function<Res
       hash.add(request.body);
     }
     if (hash.hex() != kept->request_sha256_hex) {
-      return problem(422, "validation", "this Idempotency-Key was used with another request",
+      return problem(422, "validation", "this Idempotency-Key was already used with another request",
                      {{"", "idempotency_key", "the key belongs to a request with other content"}});
     }
     Response response;

@@ -38,7 +38,7 @@ bool LateWriter::write(Write write, std::chrono::milliseconds patience) {
     }
   }
   if (!queued) return attempt(entry->write).has_value();  // nobody would come for it
-  if (lost) report("a line of the audit log was lost: the database accepted no write for too long");
+  if (lost) report("an entry of the audit log was lost: the database did not accept a write for too long");
   return done;
 }
 
@@ -101,7 +101,7 @@ void LateWriter::run() {
     }
     const auto written = attempt(entry->write);
     const bool again = !written && may_pass(written.error().code) && !last_try;
-    if (!written && !troubled) report("a write that follows its answer failed: " + written.error().message);
+    if (!written && !troubled) report("a write after the answer failed: " + written.error().message);
     troubled = again;
     if (again) continue;
     auto waiting = waiting_.lock();

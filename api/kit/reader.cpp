@@ -61,7 +61,7 @@ class Builder final : public nlohmann::json_sax<Json> {
   }
   bool parse_error(std::size_t position, const std::string&,
                    const nlohmann::detail::exception& error) override {
-    if (error.id == 406) return fail("non_finite", "a number does not fit a double");
+    if (error.id == 406) return fail("non_finite", "a number is too large for a double");
     return fail("malformed", "not JSON at byte " + std::to_string(position));
   }
 
@@ -145,7 +145,7 @@ std::optional<FieldError> parse_json(std::string_view text, Json& out) {
   if (Json::sax_parse(text.begin(), text.end(), &builder)) return std::nullopt;
   if (builder.failure && builder.failure->code == "malformed" && mentions_non_finite(text)) {
     return FieldError{builder.failure->pointer, "non_finite",
-                      "NaN and Infinity are not numbers here; leave unknown values out"};
+                      "NaN and Infinity are not allowed; leave unknown values out"};
   }
   return builder.failure ? builder.failure : FieldError{"", "malformed", "not JSON"};
 }
@@ -228,7 +228,7 @@ std::optional<std::string> Fields::text(std::string_view key, std::size_t max_by
     return std::nullopt;
   }
   if (!value->is_string()) {
-    errors_.push_back({pointer(key), "wrong_type", "must be a text", short_json(*value)});
+    errors_.push_back({pointer(key), "wrong_type", "must be a string", short_json(*value)});
     return std::nullopt;
   }
   const auto& text = value->get_ref<const std::string&>();
@@ -316,7 +316,7 @@ Json json_body(const Request& request, bool may_be_empty) {
   if (request.body.empty() && may_be_empty) return Json::object();
   const std::string type = media_type(request);
   if (type != "application/json" && type != "application/merge-patch+json") {
-    throw_problem(415, "media-type", "send Content-Type: application/json");
+    throw_problem(415, "media-type", "send the header Content-Type: application/json");
   }
   const auto encoding = request.header("content-encoding");
   if (!encoding.empty() && encoding != "identity")

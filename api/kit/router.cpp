@@ -199,7 +199,7 @@ Response Router::refuse(const Resolution& resolution, const Request& request) co
   } else if (request.method == Method::options) {
     response.status = 204;
   } else {
-    response = problem(405, "method", "this address answers to " + resolution.allow);
+    response = problem(405, "method", "this address supports only " + resolution.allow);
   }
   if (!resolution.allow.empty()) response.header("Allow", resolution.allow);
   complete_problem(request, response);
@@ -226,7 +226,7 @@ Response Router::dispatch(const Route& route, Request& request) const {
   const auto answer = [&] {
     if (!route.access.permits(request.principal)) {
       if (request.principal.roles.empty()) {
-        response = problem(401, "unauthorized", "send a token as Authorization: Bearer");
+        response = problem(401, "unauthorized", "send a token in the header Authorization: Bearer");
       } else {
         std::string needed;
         for (const Role role : route.access.roles())
@@ -234,7 +234,8 @@ Response Router::dispatch(const Route& route, Request& request) const {
         response = problem(403, "forbidden", "this needs the role " + (needed.empty() ? "admin" : needed));
       }
     } else if (route.needs_if_match && request.header("if-match").empty()) {
-      response = problem(428, "precondition-required", "send If-Match with the ETag that was read");
+      response =
+          problem(428, "precondition-required", "send the header If-Match with the ETag that was read");
     } else if (route.method == Method::post && state_->idempotency && route.keeps != Keeps::nothing &&
                !is_dry_run(request) && !request.header("idempotency-key").empty()) {
       const bool prompt = route.work_for(request) == Work::command;

@@ -102,7 +102,7 @@ std::set<std::string> wanted_fields(const Request& request, const std::string& l
     if (!known.empty() && !known.contains(name)) {
       std::string all;
       for (const auto& each : known) all += (all.empty() ? "" : ", ") + each;
-      bad_query("fields", "has an unknown name: \"" + to_utf8(name, 60) + "\"; there are " + all);
+      bad_query("fields", "has an unknown name: \"" + to_utf8(name, 60) + "\"; known are " + all);
     }
     wanted.insert(name);
     from = end + 1;
@@ -201,13 +201,13 @@ void require_match(const Request& request, const std::string& etag) {
   const auto wanted = request.header("if-match");
   if (wanted == "*" || wanted.find(etag) != std::string_view::npos) return;
   Response response =
-      problem(412, "precondition-failed", "it changed since it was read; its ETag is now " + etag);
+      problem(412, "precondition-failed", "the resource changed since it was read; its ETag is now " + etag);
   response.header("ETag", etag);
   throw ProblemException{std::move(response)};
 }
 
 void refuse_query_word(const char* name, std::span<const std::string_view> words) {
-  throw_problem(422, "validation", std::string(name) + " is not one of its words",
+  throw_problem(422, "validation", std::string(name) + " has an unknown value",
                 {{std::string("/") + name, "unknown_value", "must be one of " + list_of(words)}});
 }
 
@@ -216,7 +216,8 @@ std::string negotiate(const Request& request, std::initializer_list<std::string_
     return std::find(offers.begin(), offers.end(), word) != offers.end();
   };
   if (const auto format = request.query_value("format")) {
-    if (!offered(*format)) throw_problem(406, "not-acceptable", "this address has no format " + *format);
+    if (!offered(*format))
+      throw_problem(406, "not-acceptable", "this address does not support the format " + *format);
     return *format;
   }
   const std::string accept(request.header("accept"));
@@ -233,7 +234,7 @@ std::string negotiate(const Request& request, std::initializer_list<std::string_
   if (accept.find("application/json") != std::string::npos ||
       accept.find("application/*") != std::string::npos)
     return std::string(*offers.begin());
-  throw_problem(406, "not-acceptable", "none of the formats in Accept exists here");
+  throw_problem(406, "not-acceptable", "none of the formats in Accept is available here");
 }
 
 int prefer_wait_s(const Request& request) {

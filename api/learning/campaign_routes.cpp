@@ -52,8 +52,8 @@ Response schedule(LearningApi& l, const Request& request) {
     const auto* end = page.cursor.data() + page.cursor.size();
     const auto read = std::from_chars(page.cursor.data(), end, from);
     if (read.ec != std::errc{} || read.ptr != end)
-      throw_problem(422, "validation", "cursor is not one of ours",
-                    {{"/cursor", "bad_cursor", "is not one of ours"}});
+      throw_problem(422, "validation", "cursor was not issued by this server",
+                    {{"/cursor", "bad_cursor", "was not issued by this server"}});
   }
   const auto progress = campaign_progress(value_or_problem(l.stores.campaigns.settings(campaign.id)), filter);
   using Grid = CampaignGrid;
@@ -220,8 +220,8 @@ Response samples(LearningApi& l, const Request& request) {
     const auto [end, error] =
         std::from_chars(page.cursor.data(), page.cursor.data() + page.cursor.size(), filter.after);
     if (error != std::errc{} || end != page.cursor.data() + page.cursor.size())
-      throw_problem(422, "validation", "cursor is not one of ours",
-                    {{"/cursor", "bad_cursor", "is not one of ours"}});
+      throw_problem(422, "validation", "cursor was not issued by this server",
+                    {{"/cursor", "bad_cursor", "was not issued by this server"}});
   }
   const auto item_of = [with_features, judged, active](const CampaignStore::StoredSample& row) {
     Ordered item = sample_json(row);
@@ -268,7 +268,7 @@ Response sample_cir(LearningApi& l, const Request& request) {
   if (error != std::errc{} || end != text.data() + text.size())
     throw_problem(404, "not-found", "no sample " + to_utf8(text, 40));
   const auto row = value_or_problem(l.stores.campaigns.sample(named(l, request).id, id));
-  if (!row.sample.cir) throw_problem(404, "not-found", "this sample came without an impulse response");
+  if (!row.sample.cir) throw_problem(404, "not-found", "this sample has no impulse response");
   if (negotiate(request, {"json", "binary"}) == "json") return json_response(200, cir_json(*row.sample.cir));
   Response response;
   response.header("Content-Type", "application/octet-stream");
@@ -282,7 +282,7 @@ Response label(LearningApi& l, const Request& request) {
   const auto mission = query_mission(request);
   if (!mission)
     throw_problem(422, "validation", "mission is missing",
-                  {{"/mission", "required", "say whose ranges are meant"}});
+                  {{"/mission", "required", "give the mission of the ranges"}});
   std::vector<FieldError> errors;
   const auto body = json_body(request);
   Fields fields(body, "", errors);
@@ -291,7 +291,7 @@ Response label(LearningApi& l, const Request& request) {
   truth.los = fields.boolean("los");
   fields.finish();
   if (!truth.distance_m && !truth.los && errors.empty())
-    errors.push_back({"/los", "required", "say los, distance_m or both"});
+    errors.push_back({"/los", "required", "give los, distance_m or both"});
   refuse_if_any(errors);
   const LabelStore::Filter filter{*mission, query_network_id(request, "anchor"),
                                   query_network_id(request, "tag"), query_time(request, "since"),

@@ -56,7 +56,7 @@ Response create(LearningApi& l, const Request& request) {
     check_query(request, {"name"});
     record.name = request.query_value("name").value_or("");
     if (record.name.empty() || record.name.size() > 200)
-      throw_problem(422, "validation", "name is missing", {{"/name", "required", "say ?name="}});
+      throw_problem(422, "validation", "name is missing", {{"/name", "required", "give ?name="}});
     record.query = {R"({"imported":true})"};
     frozen = read_csv(request);
   } else {

@@ -282,8 +282,8 @@ std::string not_for_live(const DatasetTable& table) {
   std::size_t most = 1;
   for (const auto& row : table.rows) most = std::max(most, row.repeats);
   if (most == 1) return {};
-  return "its rows are means or medians of up to " + std::to_string(most) +
-         " rangings, a live range is one: train on a data set with aggregation none";
+  return "the rows are means or medians of up to " + std::to_string(most) +
+         " rangings, but a live range is a single one: train on a data set with aggregation none";
 }
 
 LearningWish wish_of(ml::Task task, const DatasetTable& table) {

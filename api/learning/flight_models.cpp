@@ -116,7 +116,7 @@ bool leave_out_worthless(std::vector<FlightModelsReport>& reports, std::vector<F
     some = true;
     corrected[i] = raw[i];
     corrected[i].notes.push_back(
-        "the models do not explain this flight better than its ranges as they came: " + report.worth->text() +
+        "the models do not explain this flight better than its uncorrected ranges: " + report.worth->text() +
         "; solved without them");
   }
   return some;

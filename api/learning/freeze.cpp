@@ -141,7 +141,7 @@ DatasetQuery read_dataset_query(const Json& body, CampaignStore& campaigns, Miss
       errors.push_back({"/missions/" + std::to_string(i), "unknown_mission", "there is no such mission"});
   }
   if (out.campaigns.empty() && out.missions.empty() && errors.empty())
-    errors.push_back({"/campaigns", "required", "name campaigns or missions"});
+    errors.push_back({"/campaigns", "required", "give campaigns or missions"});
   if (const auto how = fields.word("aggregation", k_aggregation_words)) out.how.aggregation = *how;
   out.how.filter_faults = fields.boolean("filter_faults").value_or(true);
   if (const Json* part = fields.child("split")) {

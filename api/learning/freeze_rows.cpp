@@ -184,7 +184,7 @@ std::string split_report_json(const DatasetTable& table, Place split_by,
              settings = shared(train.settings, test.settings);
   const auto duplicates = copies(table);
   Ordered warnings = Ordered::array();
-  if (test.rows == 0) warnings.push_back("no part is held out: figures come from cross-validation alone");
+  if (test.rows == 0) warnings.push_back("no part is held out: the figures come from cross-validation only");
   if (!campaigns.empty())
     warnings.push_back("train and test have a campaign in common: the same radios, perhaps the same day");
   Ordered faults = Ordered::array();

@@ -124,16 +124,16 @@ GateReport gate_of(const ml::Model& candidate, const ml::Model* current, const G
   }
   if (apart) {
     GateCheck rows{"same_rows", std::nullopt, std::nullopt, true, "none"};
-    fail(
-        rows,
-        "no rows of single ranges that neither was trained on can compare it with the active model: freeze a "
-        "data set with aggregation none that holds out places, or promote it with a reason");
+    fail(rows,
+         "there are no rows of single ranges, unused in the training of both models, to compare it with the "
+         "active model: freeze a "
+         "data set with aggregation none that holds out places, or promote it with a reason");
     out.checks.push_back(std::move(rows));
   }
   if (basis == "none") {
     GateCheck evaluated{"evaluated", std::nullopt, std::nullopt, true, basis};
     fail(evaluated,
-         "the model is from elsewhere, and no data set of this server has " +
+         "the model comes from another server, and no data set of this server has " +
              std::to_string(k_least_kept_rows) +
              " single ranges to evaluate it on: freeze one with other places, or promote it with a reason");
     out.checks.push_back(std::move(evaluated));
@@ -145,7 +145,7 @@ GateReport gate_of(const ml::Model& candidate, const ml::Model* current, const G
       GateCheck helps{"helps", mine.accuracy, mine.commonest, true, basis};
       if (!mine.accuracy || *mine.accuracy < *mine.commonest + k_slack)
         fail(helps, "accuracy " + figure(mine.accuracy.value_or(0)) + " is no better than the " +
-                        figure(*mine.commonest) + " of always saying the same class");
+                        figure(*mine.commonest) + " of always predicting the same class");
       out.checks.push_back(std::move(helps));
     }
     if (mine.accuracy) out.checks.push_back({"accuracy", mine.accuracy, theirs.accuracy, true, basis});
@@ -154,7 +154,7 @@ GateReport gate_of(const ml::Model& candidate, const ml::Model* current, const G
   no_worse("mae_m", mine.mae_m, theirs.mae_m);
   GateCheck helps{"helps", mine.mae_m, mine.mae_raw_m, true, basis};
   if (!mine.mae_m || !mine.mae_raw_m)
-    fail(helps, "nothing shows that the correction helps in places it has not seen");
+    fail(helps, "nothing shows that the correction helps in places that were not used in training");
   else if (*mine.mae_m > *mine.mae_raw_m - k_slack)
     fail(helps, "MAE " + figure(*mine.mae_m) + " m is no better than the " + figure(*mine.mae_raw_m) +
                     " m without a correction");

@@ -21,8 +21,8 @@ Result<std::shared_ptr<const ml::Model>> read_model(const ModelSource& source, c
   if (vouched_only && artifact.standing == ModelStanding::foreign)
     return make_error(Errc::conflict,
                       "model " + to_string(id) +
-                          " is not signed by this server: it was made elsewhere, or before "
-                          "models were signed. Promote it: it is then evaluated on kept data");
+                          " is not signed by this server: it was made on another server, or before models "
+                          "were signed. Promote it: it is then evaluated on data of this server");
   BOOST_OUTCOME_TRY(auto model, read_model_artifact(artifact.text));
   return std::make_shared<const ml::Model>(std::move(model));
 }
@@ -156,7 +156,7 @@ ModelAnswer ModelRegistry::predict(const Active& active, const nlos::FeatureVect
     const auto& set = active.predictor.models();
     for (const auto& model : {set.nlos_id, set.los_bias, set.nlos_bias, set.bias})
       put_lacking(model.get(), features, lacking);
-    out.note = lacking.empty() ? "the promoted models give no class" : "the range lacks " + lacking;
+    out.note = lacking.empty() ? "the promoted models predict no class" : "the range lacks " + lacking;
   }
   return out;
 }

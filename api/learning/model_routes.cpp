@@ -77,9 +77,10 @@ ModelStanding standing_of_upload(LearningApi& l, const std::string& artifact, co
   if (signature.empty()) return ModelStanding::foreign;
   const auto standing = l.models.source().signer().standing(artifact, signature);
   if (standing == ModelStanding::changed)
-    throw_problem(422, "validation", "the artifact was edited after this server signed it",
-                  {{"/signature", "edited",
-                    "is not of this content: send the artifact as it was exported, or without a signature"}});
+    throw_problem(
+        422, "validation", "the artifact was changed after this server signed it",
+        {{"/signature", "edited",
+          "does not match the content: send the artifact as it was exported, or without the signature"}});
   if (standing != ModelStanding::foreign) kept = signature;
   return standing;
 }
@@ -151,7 +152,7 @@ Ordered active_json(LearningApi& l) {
           {"correction", ml::k_correction_words.word(active->correction)},
           {"raw", raw},
           {"note", !active->fault.empty() ? Ordered(active->fault)
-                   : raw                  ? Ordered("no model is promoted: ranges are used as they come")
+                   : raw                  ? Ordered("no model is promoted: ranges are used uncorrected")
                                           : Ordered(nullptr)}};
 }
 
@@ -242,12 +243,12 @@ Response promote(LearningApi& l, const Request& request) {
   const auto& stored = candidate.stored;
   const auto reason = optional_reason(request);
   const auto before = standing_for(l, request);
-  if (before.has(stored)) throw_problem(422, "state", "the model is active already");
+  if (before.has(stored)) throw_problem(422, "state", "the model is already active");
   const auto model = value_or_problem(read_model_artifact(candidate.text));
   if (const auto lacking = lacking_in_flight(model); !lacking.empty())
     throw_problem(422, "unsupported",
                   "no range of a flight can feed the model: none has " + lacking +
-                      "; train without, or use it with predict and evaluate");
+                      "; train without it, or use the model only with predict and evaluate");
   // One that live ranges cannot be judged by would ground the others with it.
   if (const auto able =
           load_models(l.models.source(), {{stored.task, stored.id}}, ml::Correction::weighted, false);
@@ -255,7 +256,7 @@ Response promote(LearningApi& l, const Request& request) {
     throw_problem(422, "unsupported", able.error().message);
   const auto gate = gate_report(l, before, candidate);
   if (!gate.passed && reason.empty())
-    throw_problem(422, "state", gate.why + " (give a reason to promote all the same)");
+    throw_problem(422, "state", gate.why + " (give a reason to promote it anyway)");
   const auto done = promoted(l, request,
                              "model.promote " + to_string(stored.id) +
                                  (gate.passed ? "" : " against the gate: " + gate.why) +

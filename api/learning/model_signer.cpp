@@ -59,7 +59,7 @@ struct ModelSigner::Key {
 ModelSigner::Seed ModelSigner::random_seed() {
   Seed seed{};
   if (RAND_bytes(seed.data(), static_cast<int>(seed.size())) != 1)
-    throw std::runtime_error("the system gives no random bytes for the key of the models");
+    throw std::runtime_error("the system provides no random bytes for the key of the models");
   return seed;
 }
 
@@ -108,10 +108,9 @@ Result<ModelSource::Artifact> ModelSource::artifact(const ModelId& id) const {
   BOOST_OUTCOME_TRY(out.text, store_->artifact(id));
   out.standing = signer_->standing(out.text, out.stored.signature);
   if (out.standing == ModelStanding::changed)
-    return make_error(Errc::conflict,
-                      "model " + anchord::to_string(id) +
-                          " is not what this server signed: its artifact was edited. Train it "
-                          "again, or upload the artifact it should be");
+    return make_error(Errc::conflict, "model " + anchord::to_string(id) +
+                                          " does not match the signature of this server: its artifact was "
+                                          "changed. Train it again, or upload the original artifact");
   return out;
 }
 

@@ -54,7 +54,7 @@ std::string lacking_in_flight(const ml::Model& model) {
   std::string out;
   for (const auto& name : model.info.features) {
     const auto feature = nlos::feature_of(name);
-    const char* why = "a column of its table alone";
+    const char* why = "a column that only its own table has";
     if (feature && nlos::live_ranges_have(*feature)) continue;
     if (feature) {
       switch (nlos::needs_of(*feature)) {

@@ -95,7 +95,8 @@ TrainingRequest read_training_request(const Json& body, std::vector<FieldError>&
     const std::string at = "/methods/" + std::to_string(i);
     const auto method = ml::method_of(methods[i]);
     if (!method) {
-      errors.push_back({at, "unknown_value", "there is no such method; there are " + methods_for(spec.task)});
+      errors.push_back(
+          {at, "unknown_value", "there is no such method; the methods are " + methods_for(spec.task)});
     } else if (!ml::suits(*method, spec.task)) {
       errors.push_back({at, "unsuitable",
                         methods[i] + " cannot learn " + std::string(ml::task_name(spec.task)) +

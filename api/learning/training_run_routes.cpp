@@ -89,7 +89,7 @@ Response remove(LearningApi& l, const Request& request) {
   const auto run = value_or_problem(l.stores.runs.run(id));
   const auto job = value_or_problem(l.job_store.job(JobId{id.uuid}));
   if (job.state == JobState::queued || job.state == JobState::running)
-    throw_problem(422, "state", "the run goes on; cancel its job first");
+    throw_problem(422, "state", "the run has not ended; cancel its job first");
   value_or_problem(l.stores.runs.remove(run.id));
   l.audit(request, "training.delete " + to_string(id));
   Response response;

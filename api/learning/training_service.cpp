@@ -62,7 +62,7 @@ Result<JobEnd> TrainingService::take_in(const TrainingRun& run, const std::strin
   if (run.model) return JobEnd{href, ""};
   const auto json = Json::parse(answer, nullptr, false);
   if (!json.is_object() || !json.contains("artifact") || !json.contains("parts"))
-    return make_error(Errc::internal, "the worker's answer cannot be read");
+    return make_error(Errc::internal, "the answer of the worker process cannot be read");
   const auto artifact = json["artifact"].get<std::string>();
   // What a worker made is read like what a stranger sends: the server never trusts bytes it will fly with.
   BOOST_OUTCOME_TRY(const auto model, read_model_artifact(artifact));

@@ -54,7 +54,7 @@ Result<std::string> do_work(std::string_view message, const std::stop_token& sto
   } catch (const Json::exception& fault) {
     return make_error(Errc::bad_frame, fault.what());
   }
-  return make_error(Errc::bad_frame, "no work of this kind");
+  return make_error(Errc::bad_frame, "unknown kind of work");
 }
 
 Result<std::string> work_inline(const std::string& message, const WorkProgressSink& progress,

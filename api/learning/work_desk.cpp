@@ -196,10 +196,10 @@ Result<void> WorkDesk::State::look_after_waiting(const std::vector<WorkStatus>& 
     return boost::outcome_v2::success();
   }
   const bool others = std::ranges::any_of(workers, [&](const auto& w) { return w.seen_s_ago < k_alarm_s; });
-  raise(others ? "jobs wait, and the workers that are there run another version than this server's " +
-                     deps.options.version + ": install the same one"
-               : "jobs wait and no worker was seen for a minute: start anchord worker --database, or set "
-                 "jobs.run_here to on");
+  raise(others ? "jobs are waiting, and the running workers have another version than this server (" +
+                     deps.options.version + "): install the same version"
+               : "jobs are waiting and no worker has been seen for one minute: start anchord worker "
+                 "--database, or set jobs.run_here to on");
   return boost::outcome_v2::success();
 }
 

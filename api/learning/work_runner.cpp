@@ -72,15 +72,17 @@ void WorkRunner::settle(const WorkClaim& claim, std::string_view what, const std
     const auto stored = store();
     if (stored) return deps_.log(what, claim, "");
     if (stored.error().code == Errc::conflict)
-      return deps_.log("job taken over, nothing is stored", claim, stored.error().message);
+      return deps_.log("job was taken over by another worker, nothing is stored", claim,
+                       stored.error().message);
     if (!database_away(stored.error())) {
-      deps_.log("result refused by the database", claim, stored.error().message);
+      deps_.log("result rejected by the database", claim, stored.error().message);
       (void)deps_.work.fail(claim, stored.error()).has_value();
       return;
     }
     // Nobody waits for a database that is away when it is time to go: the lease runs out, another begins
     // anew.
-    if (stopping()) return deps_.log("database away, nothing is stored", claim, stored.error().message);
+    if (stopping())
+      return deps_.log("database not reachable, nothing is stored", claim, stored.error().message);
     std::this_thread::sleep_for(k_store_again);
   }
 }

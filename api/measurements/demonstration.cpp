@@ -53,9 +53,9 @@ Result<Mission> Demonstration::start(double speed) {
   Thread last;
   {
     auto playing = playing_.lock();
-    if (playing->stopping) return make_error(Errc::conflict, "the server stops");
+    if (playing->stopping) return make_error(Errc::conflict, "the server is stopping");
     if (std::exchange(playing->now, true))
-      return make_error(Errc::conflict, "the demonstration is being flown already: wait for its end");
+      return make_error(Errc::conflict, "the demonstration is already being flown: wait until it has ended");
     last = std::move(playing->thread);
   }
   if (last.joinable()) last.join();  // it has ended
@@ -84,7 +84,7 @@ Result<Mission> Demonstration::begin(double speed) {
   const double length_s = seconds_between(rows->first(), rows->last());
   rows->shift(now.ns + static_cast<std::int64_t>(length_s / speed * 1e9) - rows->last().ns);
   auto playing = playing_.lock();
-  if (playing->stopping) return make_error(Errc::conflict, "the server stops");
+  if (playing->stopping) return make_error(Errc::conflict, "the server is stopping");
   playing->thread = Thread("anchord-demo", [this, id = mission.id, rows, speed] {
     (void)guarded("demonstration", [&] { play(id, *rows, speed); });
     auto end = playing_.lock();

@@ -251,9 +251,8 @@ class IngestRun {
       errors.push_back({"/mission", "unknown_mission", "there is no mission " + to_string(id)});
     } else if (fix != nullptr && fix->frame != mission->frame) {
       errors.push_back({mission->frame == TrackFrame::wgs84 ? "/local_m" : "/lon", "wrong_frame",
-                        mission->frame == TrackFrame::wgs84
-                            ? "the mission is on the globe: send lon, lat, h_m"
-                            : "the mission has a local frame: send local_m"});
+                        mission->frame == TrackFrame::wgs84 ? "the mission is in WGS84: send lon, lat, h_m"
+                                                            : "the mission has a local frame: send local_m"});
     }
   }
 
@@ -299,9 +298,10 @@ class IngestRun {
     auto stored = append(service_.store_, std::move(rows_), atomic_);
     rows_.clear();
     if (!stored) {
-      std::string before = accepted_ + duplicates_ == 0 ? ""
-                                                        : "; " + std::to_string(accepted_ + duplicates_) +
-                                                              " rows before are stored, send all again";
+      std::string before = accepted_ + duplicates_ == 0
+                               ? ""
+                               : "; " + std::to_string(accepted_ + duplicates_) +
+                                     " rows before it are stored; send all rows again";
       throw ProblemException{problem_of(make_error(stored.error().code, stored.error().message + before))};
     }
     settle(stored.value(), live);
@@ -326,8 +326,10 @@ class IngestRun {
           break;
         case RowOutcome::conflict:
           conflict_ = true;
-          reject(lines_[i],
-                 {{"", "conflict", "the same identity is stored with other content; the stored row stays"}});
+          reject(
+              lines_[i],
+              {{"", "conflict",
+                "a row with the same identity and other content is already stored; the stored row stays"}});
           break;
         case RowOutcome::unknown_mission:
           reject(lines_[i], {{"/mission", "unknown_mission", "the mission was removed"}});

@@ -204,8 +204,8 @@ Response list_ranges(MeasurementApi& s, const Request& request) {
   std::optional<std::uint64_t> total;
   if (const auto count = request.query_value("count")) {
     if (*count != "exact" || wanted)
-      throw_problem(422, "validation", "what is counted is stored",
-                    {{"/count", "unknown_value", "must be exact, and goes without class"}});
+      throw_problem(422, "validation", "only stored values are counted",
+                    {{"/count", "unknown_value", "must be exact, and cannot be combined with class"}});
     total = value_or_problem(s.measurements.count_ranges(filter));
   }
   const bool judged = wanted || query_flag(request, "predicted");
@@ -259,7 +259,7 @@ Range one_range(MeasurementApi& s, const Request& request) {
 Response range_cir(MeasurementApi& s, const Request& request) {
   check_query(request, {"format"});
   const Range range = one_range(s, request);
-  if (!range.cir) throw_problem(404, "not-found", "this range came without an impulse response");
+  if (!range.cir) throw_problem(404, "not-found", "this range has no impulse response");
   if (negotiate(request, {"json", "binary"}) == "json") return json_response(200, cir_json(*range.cir));
   Response response;
   response.header("Content-Type", "application/octet-stream");

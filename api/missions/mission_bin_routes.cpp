@@ -51,7 +51,7 @@ Response empty_answer() {
 /// For good, before its time; of what is in the bin already, so that nothing goes in one step.
 Response purge(MissionApi& s, const Request& request, const MissionId& id) {
   if (!request.principal.has(Role::admin))
-    throw_problem(403, "forbidden", "removing a mission for good needs the role admin");
+    throw_problem(403, "forbidden", "removing a mission permanently needs the role admin");
   const auto binned = s.bin.binned(id);
   if (!binned) {
     value_or_problem(s.missions.mission(id));
@@ -69,7 +69,7 @@ void refuse_in_use(MissionApi& s, const Mission& mission) {
     throw_problem(409, "conflict", mission.name + " is in the air: land and finish it, then delete it");
   if (mission.state == MissionState::recording)
     throw_problem(409, "conflict",
-                  mission.name + R"( records: finish it first (POST actions {"action":"finish"}))");
+                  mission.name + R"( is recording: finish it first (POST actions {"action":"finish"}))");
 }
 
 Response remove(MissionApi& s, const Request& request) {
@@ -116,8 +116,8 @@ Response restore(MissionApi& s, const Request& request) {
   s.missions.forget(id);
   const Mission mission = value_or_problem(s.missions.mission(id));
   s.audit(request, "mission.restore " + to_string(id));
-  s.events.add(EventLevel::info, "mission.restored", mission.name + " is back, by " + request.principal.name,
-               id);
+  s.events.add(EventLevel::info, "mission.restored",
+               mission.name + " was restored by " + request.principal.name, id);
   return mission_answer(s, 200, mission);
 }
 

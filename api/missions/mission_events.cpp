@@ -69,15 +69,16 @@ void MissionService::State::publish(Flight& flight, const flight::AnchorEstimate
 void MissionService::State::publish(Flight& flight, const flight::FixRejected& event) {
   deps.events.add(EventLevel::warning, "track." + event.reason,
                   event.reason == "excluded" ? "positions were excluded by a person"
-                                             : "a position is rejected: " + event.reason +
-                                                   "; more of them are counted in the flight's state",
+                                             : "a position was rejected: " + event.reason +
+                                                   "; further ones are counted in the state of the flight",
                   flight.id);
 }
 
 void MissionService::State::publish(Flight& flight, const flight::OriginMoved&) {
-  deps.events.add(EventLevel::warning, "track.origin",
-                  "the first positions were no part of the flight: its origin is another from here on",
-                  flight.id);
+  deps.events.add(
+      EventLevel::warning, "track.origin",
+      "the first positions did not belong to the flight: its origin is a different one from now on",
+      flight.id);
 }
 
 }  // namespace anchord::api

@@ -146,7 +146,10 @@ void MissionService::State::work(Flight& flight) {
   queued -= rows.size();
   if (dropped > 0) {
     deps.events.add(EventLevel::warning, "live.behind",
-                    std::to_string(dropped) + " measurements left the live path; they are stored", flight.id);
+                    std::to_string(dropped) +
+                        " measurements were dropped from the live estimates because their queue was full; "
+                        "they are stored",
+                    flight.id);
   }
   auto work = flight.work.lock();
   if (flight.rebuilding) {

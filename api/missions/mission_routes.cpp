@@ -88,7 +88,7 @@ void require_right_to_take(MissionApi& s, const Request& request, const MissionI
   if (!holder || holder->id == taker) return;
   require_control(s, request, holder->id, lease,
                   holder->name + " (mission " + to_string(holder->id) +
-                      ") records with the devices; taking them needs the lease of its control");
+                      ") is recording with the devices; to take them, send the lease of its control");
 }
 
 Response create(MissionApi& s, const Request& request) {
@@ -101,7 +101,8 @@ Response create(MissionApi& s, const Request& request) {
   // A local frame has no place for a rover's positions.
   const bool records = wanted.any && mission.frame == TrackFrame::wgs84;
   if (wanted.take && !records && errors.empty())
-    errors.push_back({"/take_devices", "contradiction", "a mission in a local frame records no devices"});
+    errors.push_back(
+        {"/take_devices", "contradiction", "a mission in a local frame cannot record with the devices"});
   refuse_if_any(errors);
   mission.created = s.clock.now();
   mission.id.uuid = make_uuid_v7(mission.created);
@@ -133,10 +134,11 @@ Response finish(MissionApi& s, const Request& request, const MissionId& id, cons
 Response take_devices(MissionApi& s, const Request& request, const Mission& mission,
                       const std::string& lease) {
   if (mission.state != MissionState::recording)
-    throw_problem(422, "state", mission.name + " does not record: devices are for a mission that does");
+    throw_problem(422, "state",
+                  mission.name + " is not recording: only a mission that is recording can have the devices");
   if (mission.frame != TrackFrame::wgs84)
     throw_problem(422, "state",
-                  mission.name + " is in a local frame: a rover's positions have no place in it");
+                  mission.name + " is in a local frame: it cannot use the positions of a rover");
   require_right_to_take(s, request, mission.id, lease);
   s.stream.take(mission, request.principal.name);
   s.audit(request, "mission.take_devices " + to_string(mission.id));
@@ -184,7 +186,8 @@ Work work_of_action(const Request& request) {
 Response estimates_over_time(MissionApi& s, const Request& request) {
   check_query(request, {});
   const auto text = s.missions.estimates_over_time(named_mission(s, request).id);
-  if (!text) throw_problem(503, "storage", "the stored rows of this flight cannot be read now: ask again");
+  if (!text)
+    throw_problem(503, "storage", "the stored rows of this flight cannot be read at the moment: try again");
   Response response;
   response.body = *text;
   response.header("Content-Type", "application/json");

@@ -30,7 +30,7 @@ std::string broker_metrics(const BrokerStatus& s) {
            std::to_string(value) + '\n';
   };
   add("anchord_mqtt_connected", "gauge", s.connected ? 1 : 0, "Whether the MQTT broker is connected");
-  add("anchord_mqtt_messages_total", "counter", s.messages, "Messages handed to the MQTT broker");
+  add("anchord_mqtt_messages_total", "counter", s.messages, "Messages sent to the MQTT broker");
   add("anchord_mqtt_connections_total", "counter", s.connections,
       "Connections that the MQTT broker accepted");
   add("anchord_mqtt_failures_total", "counter", s.failures,
@@ -40,7 +40,7 @@ std::string broker_metrics(const BrokerStatus& s) {
 
 std::string broker_alarm(const BrokerStatus& s) {
   if (s.connected || s.in_state_s < k_alarm_s) return {};
-  return "nothing is published to the MQTT broker " + s.address + ": " + s.reason;
+  return "nothing can be published to the MQTT broker " + s.address + ": " + s.reason;
 }
 
 }  // namespace anchord::api

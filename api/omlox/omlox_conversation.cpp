@@ -53,16 +53,18 @@ void OmloxConversation::on_close() { membership_ = {}; }
 
 void OmloxConversation::on_text(std::string_view text) {
   Json message;
-  if (text.size() > 64 * 1024) return close(1009, "a message has at most 64 KiB");
+  if (text.size() > 64 * 1024) return close(1009, "a message can have at most 64 KiB");
   if (const auto wrong = parse_json(text, message))
-    return refuse(k_invalid_data, "this is no JSON that can be read: " + wrong->detail);
+    return refuse(k_invalid_data, "this is not JSON that can be read: " + wrong->detail);
   if (!message.is_object()) return refuse(k_invalid_data, "send JSON objects with an event");
   const auto event = text_of(message, "event");
   if (event == "subscribe") return subscribe(message);
   if (event == "unsubscribe") return unsubscribe(message);
   if (event == "message")
-    return refuse(k_not_authorized, "this hub is read only: it takes measurements by its own API");
-  refuse(k_unknown_event, "event is subscribe or unsubscribe");
+    return refuse(
+        k_not_authorized,
+        "this hub is read-only: send measurements to the anchord API (POST /api/v1/ranges, /fixes)");
+  refuse(k_unknown_event, "event must be subscribe or unsubscribe");
 }
 
 /// By the token of this message, or by what the connection came in with.
@@ -76,7 +78,7 @@ bool OmloxConversation::let_in(const Json& message) {
       *known = std::move(holds);
       return true;
     }
-    refuse(k_not_authorized, "the token is not known, expired or revoked, or may not read");
+    refuse(k_not_authorized, "the token is unknown, expired or revoked, or may not read");
     if (++wrong_tokens_ >= k_most_wrong_tokens) close(4001, "auth");
     return false;
   }
@@ -96,7 +98,7 @@ std::optional<OmloxConversation::Wanted> OmloxConversation::wanted(const Json& m
     return std::nullopt;
   }
   if (out.topic != k_updates && out.topic != k_geojson) {
-    refuse(k_unknown_topic, "topics are location_updates and location_updates:geojson");
+    refuse(k_unknown_topic, "the topics are location_updates and location_updates:geojson");
     return std::nullopt;
   }
   out.geojson = out.topic == k_geojson;
@@ -128,7 +130,7 @@ void OmloxConversation::subscribe(const Json& message) {
   auto what = wanted(message);
   if (!what) return;
   if (subscriptions_.size() >= k_max_subscriptions)
-    return refuse(k_subscribe_failed, "at most 32 subscriptions of one connection");
+    return refuse(k_subscribe_failed, "a connection can have at most 32 subscriptions");
   const auto id = next_id_++;
   const std::string topic = what->topic;
   const bool first = subscriptions_.empty();
@@ -192,7 +194,7 @@ void OmloxConversation::on_tick(UtcTime, bool) {
     stranger = !*holds;
     if (!stranger && ask) stands = (*holds)();
   }
-  if (stranger && ticks_ > k_stranger_ticks) return close(4001, "auth: no token came");
+  if (stranger && ticks_ > k_stranger_ticks) return close(4001, "auth: no token was received");
   if (!stands) return close(4001, "auth");
   bool waits = false;
   {

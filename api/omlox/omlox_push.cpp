@@ -70,7 +70,8 @@ Result<std::string> OmloxPush::kept_as(const Webhook& hub, const Ordered& zone, 
   if (!reply.good()) return std::string();
   const Json all = Json::parse(reply.body, nullptr, false);
   if (!all.is_array())
-    return make_error(Errc::bad_frame, reply.what + " answered no list of zones, or more than 1 MiB");
+    return make_error(Errc::bad_frame,
+                      reply.what + " did not answer with a list of zones, or with more than 1 MiB");
   const auto at = std::ranges::find_if(all, [&](const Json& one) { return our_id(one) == zone["id"]; });
   return at == all.end() ? std::string() : at->value("id", std::string());
 }
@@ -122,7 +123,7 @@ Result<HubSender::Sent> OmloxPush::send_zones(const Webhook& hub) {
   try {
     zones = omlox_zones(deps_.anchors, deps_.places);
   } catch (const ProblemException&) {
-    return make_error(Errc::storage_unavailable, "what is published could not be read");
+    return make_error(Errc::storage_unavailable, "the published anchors could not be read");
   }
   std::optional<Sent> last;
   for (const auto& zone : zones) {
@@ -145,7 +146,7 @@ Result<HubSender::Sent> OmloxPush::send_zones(const Webhook& hub) {
 
 Result<HubSender::Sent> OmloxPush::send_locations(const Webhook& hub, const std::string& body) {
   const Ordered locations = Ordered::parse(body, nullptr, false);
-  if (!locations.is_array()) return Sent{0, "what was kept is no list of locations"};
+  if (!locations.is_array()) return Sent{0, "the stored text is not a list of locations"};
   Ordered providers = Ordered::array();
   for (const auto& one : locations) {
     providers.push_back(Ordered{{"id", one.value("provider_id", std::string())},

@@ -86,8 +86,8 @@ std::optional<Point> read_point(Fields& fields, const std::string& key, bool geo
   }
   if (!good) {
     point.error("coordinates", "bad_value",
-                geographic ? "must be longitude, latitude and perhaps an ellipsoidal height in metres"
-                           : "must be x, y and perhaps z, metres of the zone, at most 1000 km");
+                geographic ? "must be longitude, latitude and optionally an ellipsoidal height in metres"
+                           : "must be x, y and optionally z in metres of the zone, at most 1000 km");
     return std::nullopt;
   }
   out.with_height = numbers->size() == 3;
@@ -136,7 +136,7 @@ LocationForm location_form(OmloxApi& s, const Request& request) {
   if (crs == k_wgs84) return out;
   const auto id = parse_uuid(request.query_value("zone_id").value_or(""));
   if (!id)
-    throw_problem(422, "validation", "local metres are those of a zone",
+    throw_problem(422, "validation", "local metres need a zone",
                   {{"/zone_id", "required", "must be the id of a zone with crs=local"}});
   out.local = zone_of(s, id.value());
   need_frame(*out.local);

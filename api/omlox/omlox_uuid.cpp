@@ -21,7 +21,7 @@ Uuid omlox_uuid(std::string_view kind, std::string_view name) {
   unsigned char digest[EVP_MAX_MD_SIZE];
   unsigned int size = 0;
   const int made = EVP_Digest(text.data(), text.size(), digest, &size, EVP_sha1(), nullptr);
-  ANCHORD_CHECK(made == 1 && size >= 16, "SHA-1 is not there");
+  ANCHORD_CHECK(made == 1 && size >= 16, "SHA-1 is not available");
   Uuid out;
   std::copy_n(digest, out.bytes.size(), out.bytes.begin());
   out.bytes[6] = static_cast<std::uint8_t>((out.bytes[6] & 0x0f) | 0x50);

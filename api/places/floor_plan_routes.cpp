@@ -36,11 +36,11 @@ class Reading {
     if (reading->contains(token_))
       throw_problem(
           429, "rate-limited",
-          "another plan of this token is being read: wait for its answer, then send this one again");
+          "another plan of this token is being processed: wait for its answer, then send this one again");
     if (reading->size() >= k_pictures_at_once)
       throw_problem(503, "overloaded",
                     std::to_string(k_pictures_at_once) +
-                        " plans of others are being read: send this one again in a moment");
+                        " plans of other users are being processed: send this one again in a moment");
     reading->insert(token_);
   }
   ~Reading() {
@@ -91,7 +91,7 @@ std::string picture_of(const Request& request) {
   const auto too_large = [] {
     throw_problem(413, "too-large",
                   "the plan is larger than " + std::to_string(floor_plan::k_max_image_bytes >> 20) +
-                      " MiB: scale it down, or send one floor alone");
+                      " MiB: scale it down, or send a single floor");
   };
   std::string out;
   if (request.body_stream == nullptr) {
@@ -131,7 +131,7 @@ Json worked(PlaceApi& s, const PlanQuestion& question, const std::string& pictur
 std::string png_of(const Json& answer) {
   const auto png = from_base64(answer.value("png", std::string()));
   if (!png || !floor_plan::image_head(std::as_bytes(std::span(*png))))
-    throw_problem(500, "internal", "the worker's picture cannot be read");
+    throw_problem(500, "internal", "the answer of the worker process cannot be read");
   return *png;
 }
 
@@ -262,8 +262,9 @@ Response tile_picture(PlaceApi& s, const Request& request) {
   const Floor floor = path_floor(s, request);
   if (!floor.tiles)
     throw_problem(404, "not-found",
-                  floor.backdrop ? "the plan has no tiles: tiles_missing of the floor says why"
-                                 : "the plan is not placed: PUT .../plan/georeference");
+                  floor.backdrop
+                      ? "the plan has no tiles: the field tiles_missing of the floor gives the reason"
+                      : "the plan has no georeference: PUT .../plan/georeference");
   const auto& tiles = *floor.tiles;
   const auto level = path_count(request, "level"), column = path_count(request, "column"),
              row = path_count(request, "row");
@@ -359,7 +360,7 @@ Result<JobEnd> trace(PlaceApi& s, const Floor& floor, const Georeference& georef
   try {
     proposal = to_wire(proposal_json(traced, georeference.origin));
   } catch (const Json::exception&) {
-    return make_error(Errc::internal, "the worker's answer cannot be read");
+    return make_error(Errc::internal, "the answer of the worker process cannot be read");
   }
   BOOST_OUTCOME_TRYV(keep_proposal(s, floor, {proposal}));
   return JobEnd{"/api/v1/floors/" + to_string(floor.id) + "/plan/trace",
@@ -404,7 +405,7 @@ void add_floor_plan_routes(Router& router, PlaceApi& s) {
   };
   shows(plan, &Floor::plan, "the floor has no plan");
   shows(plan + "/preview", &Floor::preview, "the floor has no plan");
-  shows(plan + "/backdrop", &Floor::backdrop, "the plan is not placed: PUT .../plan/georeference");
+  shows(plan + "/backdrop", &Floor::backdrop, "the plan has no georeference: PUT .../plan/georeference");
   router.add({Method::get, plan + "/tiles/{level}/{column}/{row}", readers(), on(tile_picture)});
   router.add(
       as_heavy({Method::put, plan + "/georeference", writers, on(put_georeference), 1 << 20, false, true}));

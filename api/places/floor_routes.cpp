@@ -80,15 +80,15 @@ void give_to_site(PlaceApi& s, const Request& request, const Floor& floor, const
   if (!Access::any_of({Role::admin}).permits(request.principal))
     throw_problem(403, "forbidden", "site_outline changes the site: that needs the role admin");
   if (outline.empty())
-    throw_problem(422, "validation", "there is no outline to give to the site",
+    throw_problem(422, "validation", "there is no outline to copy to the site",
                   {{"/site_outline", "bad_value", "needs an outline"}});
   const auto building = value_or_problem(s.places.building(floor.building));
   Site site = value_or_problem(s.sites.site(building.site));
   std::string wrong;
   const auto rings = rings_of(kept_json(outline.text), wrong);
   if (!rings)
-    throw_problem(422, "validation", "the outline cannot be the site's",
-                  {{"/outline" + wrong, "out_of_range", "a corner is [lon, lat] in degrees"}});
+    throw_problem(422, "validation", "the outline cannot be used for the site",
+                  {{"/outline" + wrong, "out_of_range", "a corner must be [lon, lat] in degrees"}});
   site.outline = *rings;
   value_or_problem(s.sites.update(site, site.version));
   s.audit(request, "site.change " + to_string(site.id) + " outline of floor " + to_string(floor.id));

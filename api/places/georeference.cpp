@@ -56,7 +56,7 @@ Click read_click(const Json& body, const std::string& where, std::int64_t width_
   else if (enu && !lon && !lat)
     click.pair.enu_m = {(*enu)[0], (*enu)[1]};
   else if (fields.is_object())
-    fields.error("lon", "required", "a point needs lon and lat, or enu_m, and not both");
+    fields.error("lon", "required", "a point needs either lon and lat, or enu_m");
   fields.finish();
   return click;
 }
@@ -72,7 +72,7 @@ std::optional<double> read_known_scale(Fields& fields, std::vector<FieldError>& 
   if (!from || !to || !length) return std::nullopt;
   const double px = std::hypot((*from)[0] - (*to)[0], (*from)[1] - (*to)[1]);
   if (px < 5) {
-    errors.push_back({"/known_length", "out_of_range", "its ends are less than 5 pixels apart"});
+    errors.push_back({"/known_length", "out_of_range", "the two ends are less than 5 pixels apart"});
     return std::nullopt;
   }
   return *length / px;
@@ -100,7 +100,8 @@ Georeference by_points(const Json& points, Fields& fields, std::int64_t width_px
     origin = click.at;
   }
   if (!origin)
-    throw_problem(422, "validation", "the site has no origin: give points in degrees, or the site an origin",
+    throw_problem(422, "validation",
+                  "the site has no origin: give the points in degrees, or set an origin for the site",
                   {{"/points", "bad_value", "enu_m needs a site with an origin"}});
   out.origin = *origin;
   const EnuFrame frame(out.origin);
@@ -176,8 +177,9 @@ Result<Georeference> by_map(const GeoTags& tags, std::string_view source, std::i
     const Eigen::Vector2d map = tags.map_from_pixel * Eigen::Vector3d(pixel.x(), pixel.y(), 1);
     if (projection) return projection->geographic(map, 0);
     if (std::abs(map.x()) > 180 || std::abs(map.y()) > 90)
-      return make_error(Errc::invalid_argument,
-                        "the map file puts the plan off the globe: check its unit and EPSG code");
+      return make_error(
+          Errc::invalid_argument,
+          "with the map file the plan has no valid position on the globe: check its unit and EPSG code");
     return Wgs84{map.y(), map.x(), 0};
   };
   const double w = static_cast<double>(width_px), h = static_cast<double>(height_px);
@@ -197,7 +199,7 @@ Result<Georeference> by_map(const GeoTags& tags, std::string_view source, std::i
   BOOST_OUTCOME_TRY(const auto fit, floor_plan::fit_plan(pairs, {.model = FitModel::affine}));
   if (site_origin && fit.transform.enu_from({w / 2, h / 2}).norm() > 50'000)
     return make_error(Errc::invalid_argument,
-                      "the map file puts the plan more than 50 km from its site: check its EPSG code");
+                      "with the map file the plan is more than 50 km from its site: check its EPSG code");
   out.transform = fit.transform;
   Ordered kept = head_json(source, "affine", out.origin, fit.transform);
   kept["epsg"] = tags.epsg;

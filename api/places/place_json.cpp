@@ -78,7 +78,8 @@ Ordered floor_json(const Floor& f) {
     out["tiles"] = tiles_json(f, out["georeference"]["origin"]);
   else if (out["backdrop"].is_object())
     out["tiles_missing"] = out["georeference"].value(
-        "tiles_missing", "the plan was placed by a version that made none: PUT .../plan/georeference again");
+        "tiles_missing",
+        "the plan was georeferenced by a version that made no tiles: PUT .../plan/georeference again");
   for (const char* ours : {"extent_m", "tiles_missing"})
     if (out["georeference"].is_object()) out["georeference"].erase(ours);
   if (const auto kept = kept_json(f.structure.text); kept.is_object()) {

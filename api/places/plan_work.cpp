@@ -73,7 +73,7 @@ Result<std::string> tiles(const floor_plan::Image& image, const floor_plan::Plan
   return out;
 }
 
-Error unreadable() { return make_error(Errc::internal, "the worker's answer cannot be read"); }
+Error unreadable() { return make_error(Errc::internal, "the answer of the worker process cannot be read"); }
 
 /// What a worker made of a stranger's picture may be anything: every number is looked at.
 Result<MadeTiles> read_tiles(std::string answer) {
@@ -164,15 +164,15 @@ Json head_of(std::string_view message) {
 Error advised(Error error) {
   if (error.code == Errc::no_convergence)
     error.message +=
-        ", which no floor plan needs: export the page as PNG, or again without its filling patterns";
+        ", far more than a floor plan needs: export the page as PNG, or again without its hatch patterns";
   if (error.code == Errc::unsupported)
-    error.message += ": install poppler-utils there, or export the page as PNG";
+    error.message += ": install poppler-utils on the server, or export the page as PNG";
   if (error.code == Errc::bad_frame) error.message += ": export the PDF again, without a password";
   return error;
 }
 
 Result<std::string> page(std::string_view pdf, int number, double wanted_dpi, const RunProgram& run) {
-  if (!run) return make_error(Errc::unsupported, "this program draws no PDF: export the page as PNG");
+  if (!run) return make_error(Errc::unsupported, "this server cannot read PDF: export the page as PNG");
   const auto n = std::to_string(number);
   // From the first page on: of a page that is not there alone pdfinfo prints not even how many there are.
   const auto info = run({"pdfinfo", "-f", "1", "-l", n, "-"}, pdf, 4 << 20);
@@ -207,7 +207,7 @@ bool is_tile_of(const PlanTiles& tiles, int level, int column, int row) {
 
 Error too_busy(int cpu_s) {
   return make_error(Errc::no_convergence,
-                    "the picture kept its decoder busy for more than " + std::to_string(cpu_s) +
+                    "decoding the picture took more than " + std::to_string(cpu_s) +
                         " s of processor time: save it again as a plain PNG, or a simpler or smaller page");
 }
 
@@ -215,7 +215,7 @@ Result<std::string> do_plan_work(std::string_view message, const std::stop_token
                                  const WorkProgressSink& progress, const RunProgram& run_program) {
   const auto line_end = message.find('\n');
   if (!is_plan_work(message) || line_end == std::string_view::npos)
-    return make_error(Errc::bad_frame, "no work on a plan");
+    return make_error(Errc::bad_frame, "unknown work on a floor plan");
   const auto head = head_of(message);
   const auto bytes = message.substr(line_end + 1);
   try {
@@ -251,7 +251,7 @@ Result<std::string> do_plan_work(std::string_view message, const std::stop_token
   } catch (const Json::exception& fault) {
     return make_error(Errc::bad_frame, fault.what());
   }
-  return make_error(Errc::bad_frame, "no work of this kind");
+  return make_error(Errc::bad_frame, "unknown kind of work");
 }
 
 Result<std::string> plan_work_inline(const std::string& message, const WorkProgressSink& progress,
@@ -290,9 +290,9 @@ Result<std::string> asked(const RunWork& run, const SteadyClock& steady, const P
     return late || canceled();
   });
   if (!answer && late)
-    return make_error(Errc::no_convergence,
-                      "the picture was not read within " + std::to_string(static_cast<int>(k_plan_work_s)) +
-                          " s: save it smaller, or send it when the server is less busy");
+    return make_error(Errc::no_convergence, "the picture was not processed within " +
+                                                std::to_string(static_cast<int>(k_plan_work_s)) +
+                                                " s: scale it down, or send it when the server is less busy");
   return answer;
 }
 

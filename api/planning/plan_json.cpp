@@ -116,7 +116,7 @@ PlanWaypoint read_waypoint(const Json& json, const std::string& at, std::vector<
 std::optional<NetworkId> read_anchor(const Json& id, const std::string& at, std::vector<FieldError>& errors) {
   const auto parsed = id.is_string()
                           ? parse_network_id(id.get<std::string>())
-                          : Result<NetworkId>(make_error(Errc::invalid_argument, "must be a text"));
+                          : Result<NetworkId>(make_error(Errc::invalid_argument, "must be a string"));
   if (parsed) return parsed.value();
   errors.push_back({at, "bad_id", parsed.error().message});
   return std::nullopt;

@@ -130,7 +130,7 @@ Response generate(PlanningApi& s, const Request& request) {
   if (body.is_object() && !body.contains("name")) body["name"] = "Generated";
   Plan plan = read_plan(body, errors);
   if (errors.empty() && plan.outline.empty())
-    errors.push_back({"/outline", "required", "waypoints are made from it"});
+    errors.push_back({"/outline", "required", "the waypoints are computed from it"});
   refuse_if_any(errors);
   value_or_problem(s.structures.join(plan));
   const Plan made = value_or_problem(planning::generate_waypoints(plan));

@@ -77,7 +77,7 @@ void Conversation::on_text(std::string_view text) {
                                   {"t_us", hub_.clock().now().us()}};
     return send(to_wire(answer));
   }
-  refuse(message, 422, "validation", "op is sub, unsub, seen or time");
+  refuse(message, 422, "validation", "op must be sub, unsub, seen or time");
 }
 
 void Conversation::subscribe(const Json& message) {
@@ -95,7 +95,7 @@ void Conversation::subscribe(const Json& message) {
       subscription.max_age_us = static_cast<std::int64_t>(1e6 * *age_s);
     subscription.deltas = inner.boolean("deltas").value_or(false);
     if (subscription.deltas && name != "anchors.estimates")
-      inner.error("deltas", "not_applicable", "only anchors.estimates has deltas");
+      inner.error("deltas", "not_applicable", "only the topic anchors.estimates has deltas");
     if (const Json* anchors = inner.child("anchors")) {
       if (!anchors->is_array() || anchors->size() > 1000)
         inner.error("anchors", "wrong_type", "must be an array of at most 1000 network ids");
@@ -125,7 +125,7 @@ void Conversation::subscribe(const Json& message) {
   const TopicInfo* topic = find_topic(*name);
   if (topic == nullptr) return refuse(message, 404, "not-found", "there is no topic " + *name);
   if (subscriptions_.size() >= k_max_subscriptions) {
-    refuse(message, 429, "rate-limited", "at most 32 subscriptions a connection");
+    refuse(message, 429, "rate-limited", "a connection can have at most 32 subscriptions");
     return;
   }
   subscription.topic = topic->topic;

@@ -40,15 +40,15 @@ std::string cloud_event(const LiveEvent& event) {
 
 std::string webhook_signature(std::string_view secret, std::string_view id, std::int64_t seconds,
                               std::string_view body) {
-  ANCHORD_CHECK(secret.starts_with(k_prefix), "a webhook's secret begins with " << k_prefix);
+  ANCHORD_CHECK(secret.starts_with(k_prefix), "the secret of a webhook must begin with " << k_prefix);
   const auto key = from_base64(secret.substr(k_prefix.size()));
-  ANCHORD_CHECK(key && !key->empty(), "a webhook's secret is base64");
+  ANCHORD_CHECK(key && !key->empty(), "the secret of a webhook must be base64");
   const std::string text = std::string(id) + '.' + std::to_string(seconds) + '.' + std::string(body);
   unsigned char mac[EVP_MAX_MD_SIZE];
   unsigned int size = 0;
   const auto* made = HMAC(EVP_sha256(), key->data(), static_cast<int>(key->size()),
                           reinterpret_cast<const unsigned char*>(text.data()), text.size(), mac, &size);
-  ANCHORD_CHECK(made != nullptr, "HMAC-SHA256 is not there");
+  ANCHORD_CHECK(made != nullptr, "HMAC-SHA256 is not available");
   return "v1," + base64({reinterpret_cast<const char*>(mac), size});
 }
 

@@ -89,7 +89,7 @@ void read_hub(Fields& fields, Webhook& webhook, std::vector<FieldError>& errors)
   if (webhook.kind != WebhookKind::omlox_hub) {
     for (const char* key : {"dialect", "token"}) {
       if (fields.has(key))
-        errors.push_back({fields.pointer(key), "not_applicable", "only with kind omlox_hub"});
+        errors.push_back({fields.pointer(key), "not_applicable", "allowed only with kind omlox_hub"});
     }
     return;
   }
@@ -183,7 +183,7 @@ Response remove(WebhookApi& s, const Request& request) {
 Response test(WebhookApi& s, const Request& request) {
   check_query(request, {});
   const Webhook webhook = path_webhook(s, request);
-  if (!webhook.enabled) throw_problem(422, "state", "the webhook is off: set enabled");
+  if (!webhook.enabled) throw_problem(422, "state", "the webhook is switched off: set enabled to true");
   return json_response(202, delivery_json(value_or_problem(s.service.test(webhook))));
 }
 

@@ -79,7 +79,7 @@ void WebhookService::stop() {
   wake_.notify_all();
   if (thread_.joinable()) thread_.join();
   for (const auto& [id, lane] : lanes_) lane->thread.join();
-  (void)guarded("locations that were not sent", [this] { keep_unsent(); });
+  (void)guarded("locations not sent yet", [this] { keep_unsent(); });
   lanes_.clear();
   std::vector<WebhookDelivery> left;
   {

@@ -138,7 +138,8 @@ ExclusionRequest read_exclusion_request(const Json& body, std::vector<FieldError
   s.tag = read_id(fields, "tag");
   out.reason = fields.text("reason", 500, true).value_or("");
   if (fields.has("reason") && out.reason.find_first_not_of(" \t\r\n") == std::string::npos)
-    fields.error("reason", "required", "give a reason: it is shown in the record and in every calibration");
+    fields.error("reason", "required",
+                 "give a reason: it is shown in the list of exclusions and in every calibration");
   const int ways = (out.ids.empty() ? 0 : 1) + (s.rows.empty() ? 0 : 1) +
                    (s.since || s.until || s.anchor || s.tag ? 1 : 0);
   fields.finish();
@@ -148,7 +149,7 @@ ExclusionRequest read_exclusion_request(const Json& body, std::vector<FieldError
   if (s.since && s.until && !(*s.since < *s.until))
     errors.push_back({"/until", "out_of_range", "must be after since"});
   if (s.kind == RowKind::fixes && (s.anchor || s.tag))
-    errors.push_back({"/anchor", "unknown_field", "positions are of no anchor and no tag"});
+    errors.push_back({"/anchor", "unknown_field", "positions have no anchor and no tag"});
   return out;
 }
 
@@ -215,7 +216,7 @@ Result<std::vector<Exclusion>> parse_exclusions_file(std::string_view text) {
     std::vector<api::FieldError> errors;
     auto request = api::read_exclusion_request(item, errors);
     if (errors.empty() && !request.ids.empty())
-      errors.push_back({"/ids", "unknown_field", "are of a server; name rows"});
+      errors.push_back({"/ids", "unknown_field", "exist only on a server; give rows"});
     if (!errors.empty()) return bad(at + errors.front().pointer + ": " + errors.front().detail);
     e.selection = std::move(request.selection);
     e.reason = std::move(request.reason);

@@ -62,7 +62,7 @@ void read_common(Fields& fields, const std::optional<MissionId>& given, MissionI
     if (given)
       mission = *given;
     else
-      fields.error("mission", "required", "name the mission in the row or as ?mission=");
+      fields.error("mission", "required", "give the mission in the row or as ?mission=");
   }
 }
 
@@ -77,7 +77,8 @@ std::optional<NetworkId> read_network_id(Fields& fields, std::string_view key) {
 
 constexpr double k_no_angle_deg = 360;
 constexpr const char* k_of_a_map =
-    " are of a map or earth-centred (UTM, a national grid, ECEF): make longitude and latitude of them, "
+    " are map or earth-centred coordinates (UTM, a national grid, ECEF): convert them to longitude and "
+    "latitude, "
     "POST /api/v1/transform with \"from\": \"crs\"";
 
 bool beyond(const Json* value, double most) {
@@ -98,7 +99,7 @@ bool of_a_map(Fields& fields) {
   if (far)
     fields.error(
         "local_m", "out_of_range",
-        std::string("must be within 100 km of the zero of the frame; numbers this large") + k_of_a_map);
+        std::string("must be within 100 km of the origin of the frame; numbers this large") + k_of_a_map);
   return found || far;
 }
 
@@ -124,7 +125,7 @@ void read_position(Fields& fields, Fix& fix) {
   const auto height = read_number(fields, "h_m", k_height_m, true);
   if (lon && lat && null_island(*lon, *lat)) {
     fields.error("lat", "null_island",
-                 "longitude and latitude are both 0: what a receiver without a fix sends");
+                 "longitude and latitude are both 0: a receiver sends this when it has no fix");
   }
   if (lon && lat && height) fix.position = {*lat, *lon, *height};
 }
@@ -282,8 +283,9 @@ std::optional<Cir> read_cir(const Json& value, const std::string& at, std::vecto
     if (!bytes) {
       fields.error("b64", "bad_base64", "is not base64");
     } else if (n && bytes->size() != static_cast<std::size_t>(*n) * 4) {
-      fields.error("b64", "wrong_length",
-                   "holds " + std::to_string(bytes->size()) + " bytes, n says " + std::to_string(*n * 4));
+      fields.error(
+          "b64", "wrong_length",
+          "holds " + std::to_string(bytes->size()) + " bytes, but n needs " + std::to_string(*n * 4));
     } else {
       cir.re_im.resize(bytes->size() / 2);
       std::memcpy(cir.re_im.data(), bytes->data(), cir.re_im.size() * 2);
@@ -309,7 +311,7 @@ RangeRow read_range(const Json& row, const std::optional<MissionId>& mission,
   if (const auto n = read_whole(fields, "antenna", k_antenna)) range.antenna = static_cast<std::uint8_t>(*n);
   const Json* distance = fields.child("distance_m");
   if (distance != nullptr && distance->is_number() && distance->get<double>() == 0) {
-    fields.error("distance_m", "zero_distance", "0 mm is the Pozyx failure value");
+    fields.error("distance_m", "zero_distance", "0 mm is what a Pozyx tag reports for a failed range");
   } else if (const auto d = read_number(fields, "distance_m", k_distance_m, true)) {
     range.distance_m = *d;
   }

@@ -29,7 +29,7 @@ Ed25519Public open_half_of(EVP_PKEY* key) {
   Ed25519Public::Bytes bytes{};
   std::size_t size = bytes.size();
   if (key == nullptr || EVP_PKEY_get_raw_public_key(key, bytes.data(), &size) != 1)
-    throw std::runtime_error("OpenSSL cannot make an Ed25519 key");
+    throw std::runtime_error("OpenSSL cannot create an Ed25519 key");
   return Ed25519Public(bytes);
 }
 
@@ -37,7 +37,8 @@ Ed25519Public open_half_of(EVP_PKEY* key) {
 
 Result<Ed25519Public> Ed25519Public::parse_pem(std::string_view pem) {
   const auto refused = [] {
-    return make_error(Errc::invalid_argument, "this is no public Ed25519 key in PEM (BEGIN PUBLIC KEY)");
+    return make_error(Errc::invalid_argument,
+                      "this is not a public Ed25519 key in PEM form (BEGIN PUBLIC KEY)");
   };
   const auto from = pem.find(k_begin), to = pem.find(k_end);
   if (from == std::string_view::npos || to == std::string_view::npos || to < from) return refused();

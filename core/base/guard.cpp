@@ -39,7 +39,7 @@ std::string words_of_current() {
   } catch (const std::exception& error) {
     return to_utf8(error.what(), k_most_words);
   } catch (...) {
-    return "something that is no std::exception";
+    return "an exception that is not a std::exception";
   }
 }
 

@@ -11,7 +11,7 @@ namespace {
 
 constexpr std::array<std::pair<std::string_view, std::string_view>, 4> k_by_a_person{
     {{"props", "Propellers and battery are fastened"},
-     {"airspace", "The airspace is clear and allowed"},
+     {"airspace", "The airspace is clear and the flight is permitted"},
      {"people", "Nobody is below the flight path"},
      {"pilot", "A pilot is ready with the remote control"}}};
 constexpr std::array<std::string_view, 12> k_by_itself{"drone", "arming",      "parameters", "battery",
@@ -31,7 +31,9 @@ std::string age(const std::optional<double>& seconds) {
 
 std::string fix_word(const std::optional<FixClass>& fix) {
   if (!fix || *fix == FixClass::none) return "no fix";
-  return *fix == FixClass::rtk_fixed ? "just fixed" : *fix == FixClass::rtk_float ? "RTK float" : "no RTK";
+  return *fix == FixClass::rtk_fixed   ? "fixed just now"
+         : *fix == FixClass::rtk_float ? "RTK float"
+                                       : "no RTK";
 }
 
 ChecklistItem item(const char* id, const char* text, bool ok, bool overridable, std::string detail) {
@@ -52,11 +54,12 @@ std::vector<ChecklistItem> make_checklist(const ChecklistFacts& f) {
                        !d.connected     ? "no heartbeat"
                        : !stale.empty() ? stale
                                         : d.autopilot + ", " + d.mode + (d.failsafe ? ", failsafe" : "")));
-    auto arming = item("arming", "The autopilot is ready to arm", d.ready_to_arm.value_or(false), true,
-                       d.ready_to_arm.value_or(false) ? "its own checks pass"
-                       : !d.ready_to_arm              ? "no reason reported: see the ground station"
-                       : d.not_ready.empty()          ? "its own checks do not pass yet"
-                                                      : d.not_ready);
+    auto arming =
+        item("arming", "The autopilot is ready to arm", d.ready_to_arm.value_or(false), true,
+             d.ready_to_arm.value_or(false) ? "its pre-arm checks pass"
+             : !d.ready_to_arm ? "the autopilot does not report whether it is ready: check the ground station"
+             : d.not_ready.empty() ? "its pre-arm checks do not pass yet"
+                                   : d.not_ready);
     if (!d.ready_to_arm && d.connected) arming.ok.reset();
     if (!d.connected || !stale.empty()) arming.ok = false;
     out.push_back(std::move(arming));
@@ -65,7 +68,7 @@ std::vector<ChecklistItem> make_checklist(const ChecklistFacts& f) {
                        parameters.complete && parameters.wrong.empty(), true,
                        !parameters.wrong.empty() ? parameters.wrong
                        : parameters.complete
-                           ? std::to_string(d.parameters.size()) + " read, as they should be"
+                           ? std::to_string(d.parameters.size()) + " parameters read, all as required"
                            : "being read"));
     // What the flight may use is what is above the reserve; 30 % of it stays as a margin.
     const double need =
@@ -73,39 +76,41 @@ std::vector<ChecklistItem> make_checklist(const ChecklistFacts& f) {
     out.push_back(
         item("battery", "The battery covers the plan plus 30 % reserve",
              d.battery && d.battery_age_s < k_fresh_s && d.battery_warning == 0 && *d.battery >= need, true,
-             d.battery_warning > 0 ? "the autopilot itself warns of it"
+             d.battery_warning > 0 ? "the autopilot reports a battery warning"
              : d.battery && d.battery_age_s < k_fresh_s
-                 ? words("%.0f %% left, ", 100 * *d.battery) + words("%.0f %% wanted", 100 * need)
+                 ? words("%.0f %% left, ", 100 * *d.battery) + words("%.0f %% needed", 100 * need)
                  : "unknown"));
   }
   out.push_back(item(
-      "rtk", "RTK is fixed for 10 s", f.fixed_for_s && *f.fixed_for_s >= 10 && *f.fix_age_s < 2, true,
+      "rtk", "RTK has been fixed for 10 s", f.fixed_for_s && *f.fixed_for_s >= 10 && *f.fix_age_s < 2, true,
       f.fixed_for_s ? words("fixed for %.0f s", *f.fixed_for_s) : fix_word(f.fix) + ", " + age(f.fix_age_s)));
   out.push_back(item("corrections", "Corrections are younger than 2 s",
                      f.correction_age_s && *f.correction_age_s < 2, true, age(f.correction_age_s)));
-  out.push_back(item("tag", "The tag ranges, or is in range", f.range_age_s && *f.range_age_s < 10, true,
-                     "newest range: " + age(f.range_age_s)));
+  out.push_back(item("tag", "The tag has measured a range in the last 10 s",
+                     f.range_age_s && *f.range_age_s < 10, true, "newest range: " + age(f.range_age_s)));
   std::string why = "no plan is chosen";
   if (f.plan != nullptr) {
-    why = f.plan->flyable() ? "nothing wrong" : "";
+    why = f.plan->flyable() ? "no error found" : "";
     for (const auto& i : f.plan->issues) {
       if (i.severity == planning::Severity::error && why.size() < 300)
         why += (why.empty() ? "" : "; ") + i.text;
     }
   }
   out.push_back(item("plan", "The plan can be flown", f.plan != nullptr && f.plan->flyable(), false, why));
-  out.push_back(item("place", "The aircraft may take off where it stands",
+  out.push_back(item("place", "The aircraft may take off from where it is",
                      f.place_refused && f.place_refused->empty(), false,
                      f.plan == nullptr  ? "no plan is chosen"
-                     : !f.place_refused ? "it is not known where it stands: no position from the rover"
-                     : f.place_refused->empty() ? "inside the fence and off every area"
+                     : !f.place_refused ? "its position is not known: no position received from the rover"
+                     : f.place_refused->empty() ? "inside the fence and outside every no-fly area"
                                                 : *f.place_refused));
   out.push_back(item("disk", "More than 1 GB of disk is free", f.writable && f.disk_free_bytes > 1e9, true,
                      words("%.1f GB", f.disk_free_bytes / 1e9)));
   const bool open = f.mission != nullptr && f.mission->state != MissionState::finished;
-  out.push_back(item("recording", "The mission records", open, false, open ? "" : "the mission is finished"));
+  out.push_back(
+      item("recording", "The mission is recording", open, false, open ? "" : "the mission is finished"));
   for (const auto& [id, text] : k_by_a_person)
-    out.push_back({std::string(id), std::string(text), "a person must say so", std::nullopt, true, {}, {}});
+    out.push_back(
+        {std::string(id), std::string(text), "must be confirmed by a person", std::nullopt, true, {}, {}});
   return out;
 }
 

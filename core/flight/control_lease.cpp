@@ -18,7 +18,7 @@ bool ControlLease::just_ended(const Moment& now) {
 Result<Lease> ControlLease::take(const MissionId& mission, const Holder& who, const Moment& now,
                                  bool by_force, std::string key) {
   if (const auto held = holder(now); held && !by_force)
-    return make_error(Errc::conflict, held->name + " has control since " + to_rfc3339(held->since));
+    return make_error(Errc::conflict, held->name + " has had control since " + to_rfc3339(held->since));
   lease_ = Lease{mission, std::move(key), who.token_id, who.name, now.utc, {}, later(now.steady, k_lasts_ns)};
   return *holder(now);
 }
@@ -26,9 +26,9 @@ Result<Lease> ControlLease::take(const MissionId& mission, const Holder& who, co
 Result<Lease> ControlLease::renew(const MissionId& mission, const std::string& key, const Holder& who,
                                   const Moment& now) {
   const auto held = holder(now);
-  if (!held) return make_error(Errc::conflict, "nobody has control; take it first");
+  if (!held) return make_error(Errc::conflict, "nobody has control: take control first");
   if (held->mission != mission || held->key != key || held->token_id != who.token_id)
-    return make_error(Errc::conflict, held->name + " has control since " + to_rfc3339(held->since));
+    return make_error(Errc::conflict, held->name + " has had control since " + to_rfc3339(held->since));
   lease_->until_steady = later(now.steady, k_lasts_ns);
   return *holder(now);
 }

@@ -173,7 +173,7 @@ void Operations::take_events(ActiveFlight& f) {
 void Operations::round(const Now& now, const std::optional<Estimates>& live, bool at_hand) {
   if (lease_.just_ended(now)) {
     log_event(flying() ? EventLevel::warning : EventLevel::info, "control.ended",
-              "control ended: it was not renewed for a minute",
+              "control ended: it was not renewed for one minute",
               flight_ ? std::optional(flight_->mission) : std::nullopt);
     show_soon_ = true;
   }
@@ -227,11 +227,11 @@ std::vector<std::pair<std::string_view, std::string>> Operations::alarms() const
     out.emplace_back(id, alarm && alarm->id == id ? alarm->text : "");
   }
   out.emplace_back("drone.taken_over",
-                   flies && flight_->control.taken_over() ? "the pilot or a failsafe has the aircraft" : "");
+                   flies && flight_->control.taken_over() ? "the pilot or a failsafe has taken over" : "");
   // Until the next flight, or until somebody says that he knows.
   const bool failed = flight_ && flight_->status() == FlightStatus::aborted && flight_->aborted.empty() &&
                       !flight_->control.engine().state().by_person;
-  out.emplace_back("flight.aborted", failed ? "the flight ended before its end: " + flight_->ended() : "");
+  out.emplace_back("flight.aborted", failed ? "the flight ended early: " + flight_->ended() : "");
   std::string silent;
   for (const auto& c : commands_) {
     if (flies && unconfirmed_ && c.number == *unconfirmed_)

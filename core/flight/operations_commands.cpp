@@ -144,17 +144,19 @@ Result<FlightCommand> Operations::begin(const Now& now, const Mission& mission, 
                                         bool manual, const std::string& who) {
   const Plan& plan = *ground.plan;
   manual = manual || drone_ == nullptr;
-  if (flying()) return forbidden("a flight is in the air already");
+  if (flying()) return forbidden("a flight is already in the air");
   const bool in_air = !manual && drone_->status().in_air;
   std::optional<Wgs84> took_off_from;
   if (in_air) {
     if (const auto* before = flight_of(mission.id))
       took_off_from = before->frame.wgs84_from_enu(Enu{before->home_m});
     if (!took_off_from)
-      return forbidden("the aircraft is in the air and it is not known where it took off: land it first");
+      return forbidden("the aircraft is in the air and its take-off point is not known: land it first");
   }
   if (mission.frame != TrackFrame::wgs84)
-    return forbidden("a mission in a local frame cannot be flown: an aircraft needs the globe");
+    return forbidden(
+        "a mission in a local frame cannot be flown: the aircraft needs coordinates in WGS84; create the "
+        "mission in frame wgs84");
   preparing_.emplace(mission.id, plan);
   std::string open;
   for (const auto& i : checklist(now, &mission, mission.id, ground, manual)) {
@@ -162,7 +164,7 @@ Result<FlightCommand> Operations::begin(const Now& now, const Mission& mission, 
   }
   if (!open.empty()) return forbidden("the checklist is not green: " + open);
   const auto& r = received_[mission.id];
-  if (!r.fix || r.fix->frame != TrackFrame::wgs84) return forbidden("it is not known where the aircraft is");
+  if (!r.fix || r.fix->frame != TrackFrame::wgs84) return forbidden("the aircraft's position is not known");
   BOOST_OUTCOME_TRY(const Plan flown,
                     flown_plan(plan, (took_off_from ? *took_off_from : r.fix->position).height_m));
   const EnuFrame frame(*flown.origin);
@@ -225,13 +227,13 @@ Result<FlightCommand> Operations::act(const Now& now, const MissionId& mission, 
       command.state = CommandState::accepted;
     else
       by_drone_number_[f.control.abort()] = command.number;
-    f.aborted = "aborted by " + who + ": the aircraft is the pilot's";
+    f.aborted = "aborted by " + who + ": the pilot flies the aircraft";
     f.aborted_s = now.s;
     log_event(EventLevel::warning, "procedure.aborted", f.aborted, mission);
     return command;
   }
   const auto event = trigger_of(action);
-  if (!event) return forbidden("it is being flown: there is nothing to " + word_of(action));
+  if (!event) return forbidden("the flight is already running: there is nothing to " + word_of(action));
   const auto number = note(now, mission, word_of(action), who).number;
   if (const auto why_not = f.control.command(now.s, *event, who); !why_not.empty()) {
     std::erase_if(commands_, [&](const FlightCommand& c) { return c.number == number; });
@@ -249,11 +251,11 @@ Result<DroneStatus> Operations::change_aircraft(const MissionId& mission, const 
   const auto before = drone_->status();
   if (before.connected && (before.in_air || flying()))
     return make_error(Errc::invalid_argument,
-                      "the aircraft in the air answers; land it before another one takes the link");
+                      "the aircraft on the link is in the air: land it before you change to another one");
   drone_->change_peer(sender);
   log_event(EventLevel::warning, "drone.changed",
-            who + (sender.empty() ? ": the next autopilot whose heartbeat is received is the aircraft"
-                                  : ": the autopilot at " + sender + " is the aircraft"),
+            who + (sender.empty() ? ": the next autopilot that sends a heartbeat becomes the aircraft"
+                                  : ": the autopilot at " + sender + " is now the aircraft"),
             mission);
   return drone_->status();
 }

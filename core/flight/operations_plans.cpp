@@ -74,7 +74,7 @@ Result<void> Operations::order_anchor(const Now& now, const MissionId& mission, 
         Errc::invalid_argument,
         order == procedure::AnchorOrder::reopen
             ? to_string(anchor) + " was neither accepted nor given up: there is nothing to take back"
-            : "no range of " + to_string(anchor) + " has come in this flight");
+            : "no range of " + to_string(anchor) + " has been received in this flight");
   ++f.changes.n_anchor_orders;
   take_events(f);
   show_soon_ = true;

@@ -23,11 +23,12 @@ DroneFence fence_of(const Plan& plan) {
 Result<FlightCommand> Operations::upload(const Now& now, const MissionId& mission, const Plan& plan,
                                          const std::string& what, const std::string& who) {
   const auto refuse = [](const char* why) { return make_error(Errc::invalid_argument, why); };
-  if (drone_ == nullptr) return refuse("there is no aircraft to command: nothing keeps a list");
+  if (drone_ == nullptr)
+    return refuse("this server has no link to an autopilot (drone.address): there is nothing to upload to");
   const auto status = drone_->status();
-  if (!status.connected) return refuse("no heartbeat of the aircraft is received: check its link");
+  if (!status.connected) return refuse("no heartbeat is received from the aircraft: check its link");
   if (flying() || status.in_air)
-    return refuse("the aircraft is in the air: lists are given to it on the ground");
+    return refuse("the aircraft is in the air: fence and route can be uploaded only on the ground");
   FlightUpload up{mission, plan.id, plan.version, what, 0, now.s, {}};
   std::uint64_t sent = 0;
   if (what == "fence") {
@@ -96,16 +97,16 @@ void Operations::give_fence(const Now& now) {
 
 std::optional<ChecklistItem> Operations::fence_item(const Plan& plan) const {
   if (!has_fence(plan)) return std::nullopt;
-  ChecklistItem item{"fence", "The aircraft keeps the fence itself", "", false, true, {}, {}};
+  ChecklistItem item{"fence", "The autopilot has stored the fence", "", false, true, {}, {}};
   const auto* up = uploaded(plan, "fence");
   if (up == nullptr) {
-    item.detail = "not given to it yet";
+    item.detail = "not sent to the autopilot yet";
   } else {
     item.ok = up->command.state == CommandState::accepted;
-    item.detail = up->command.state == CommandState::sent ? "being given to it"
+    item.detail = up->command.state == CommandState::sent ? "being sent to the autopilot"
                   : *item.ok                              ? up->command.text
                              : std::string(to_string(up->command.state)) + ": " + up->command.text +
-                                   "; the server's own guard holds";
+                                   "; the server still checks the fence itself";
   }
   return item;
 }

@@ -55,8 +55,7 @@ std::size_t flown_of_plan(const ChangeBasis& now) {
 void refuse_by_step(Step step, std::vector<std::string>& out) {
   if (step == Step::ready || step == Step::done) out.emplace_back("this mission is not being flown");
   if (step == Step::take_off) out.emplace_back("the aircraft is taking off: wait until it is in the air");
-  if (step == Step::landing)
-    out.emplace_back("the aircraft is landing: nothing of the plan is flown any more");
+  if (step == Step::landing) out.emplace_back("the aircraft is landing: the plan can no longer be changed");
 }
 
 /// Heights of a plan are above its origin: that cannot move under an aircraft.
@@ -66,15 +65,14 @@ void refuse_by_origin(const ChangeBasis& now, const Plan& wanted, std::vector<st
   const bool same = o ? now.own_origin && o->lat_deg == flown.lat_deg && o->lon_deg == flown.lon_deg &&
                             o->height_m == flown.height_m
                       : !now.own_origin;
-  if (!same) out.emplace_back("the origin is another one: heights are measured from it, land to change it");
+  if (!same) out.emplace_back("the origin differs: heights are measured from it; land to change it");
 }
 
 void refuse_by_fence(const ChangeBasis& now, const Plan& wanted, std::vector<std::string>& out) {
   if (now.autopilot_keeps && now.autopilot_keeps->inside != wanted.fence)
     out.emplace_back(
-        "the autopilot keeps the fence that it was given before the take-off: draw a no-fly area to keep out "
-        "of a "
-        "part of it, or land to change the fence");
+        "the autopilot keeps the fence that was uploaded before take-off: draw a no-fly area to close a part "
+        "of it, or land to change the fence");
 }
 
 void refuse_by_check(const Plan& rest, std::size_t next, std::vector<std::string>& out) {
@@ -88,7 +86,7 @@ void refuse_by_check(const Plan& rest, std::size_t next, std::vector<std::string
     if (out.size() >= k_most_reasons) return;
     const bool counted = next > 0 && issue.pointer.starts_with("/waypoints");
     out.push_back(
-        counted ? issue.text + words(" (counted from waypoint %.0f, the next)", static_cast<double>(next + 1))
+        counted ? issue.text + words(" (counted from the next waypoint, %.0f)", static_cast<double>(next + 1))
                 : issue.text);
   }
 }
@@ -101,8 +99,8 @@ void note(const ChangeBasis& now, const Plan& wanted, PlanProposal& out) {
   if (behind)
     out.notes.push_back(
         out.change.next == 0
-            ? "Waypoints that are flown already are removed: nothing changes by that"
-            : words("What is changed up to waypoint %.0f is not flown: the aircraft has passed it",
+            ? "Waypoints that have already been flown are removed: this changes nothing in flight"
+            : words("Changes up to waypoint %.0f are not flown: the aircraft has passed it",
                     static_cast<double>(out.change.next)));
   if (now.plan.settings.speed_mps != wanted.settings.speed_mps)
     out.notes.push_back(words("The speed stays %.1f m/s until the landing", now.plan.settings.speed_mps));
@@ -111,20 +109,19 @@ void note(const ChangeBasis& now, const Plan& wanted, PlanProposal& out) {
   });
   if (now.autopilot_keeps && fewer_areas)
     out.notes.emplace_back(
-        "The outline and the no-fly areas that the autopilot was given before the take-off stay closed until "
-        "the "
-        "landing");
+        "The outline and the no-fly areas that were uploaded to the autopilot before take-off stay closed "
+        "until the landing");
   const auto& limit = wanted.settings.max_flight_s;
   if (limit && now.flown_s + out.after_s.expected_s > *limit)
     out.notes.push_back(
-        words("The flight is expected to take %.0f s; at %.0f s, the limit, it returns unfinished",
+        words("The flight is expected to take %.0f s; at the limit of %.0f s it returns unfinished",
               now.flown_s + out.after_s.expected_s, *limit));
   const double need =
       std::min(wanted.settings.min_battery + k_reserve * out.after_s.expected_s / k_battery_s, 0.95);
   if (now.battery && *now.battery < need)
     out.notes.push_back(
-        words("The battery is at %.0f %%, %.0f %% cover what is still to fly plus 30 %% reserve: it "
-              "may return unfinished",
+        words("The battery is at %.0f %%, the rest of the flight needs %.0f %% with 30 %% reserve: it may "
+              "return unfinished",
               100 * *now.battery, 100 * need));
 }
 
@@ -152,20 +149,21 @@ std::vector<std::string> refuse_from_here(const PlanProposal& proposal,
                                           const std::optional<Eigen::Vector3d>& position_m) {
   std::vector<std::string> out;
   const auto& setup = proposal.setup.value();
-  if (!position_m) return {"it is not known where the aircraft is: wait for a position"};
+  if (!position_m) return {"the aircraft's position is not known: wait for a position"};
   const auto& bounds = setup.limits.bounds;
   if (auto why = procedure::refuse_standing(setup.limits, *position_m,
-                                            "the aircraft would be where it is not allowed:"))
+                                            "the aircraft would be at a position that is not allowed:"))
     return {*std::move(why)};
   Eigen::Vector3d above = setup.limits.home_m;
   above.z() = std::clamp(above.z() + setup.settings.take_off_m, setup.settings.min_height_m,
                          setup.settings.max_height_m);
   if (!planning::route(bounds, *position_m, above))
-    out.emplace_back("the way home is cut: there is no route from the aircraft to where it took off");
+    out.emplace_back(
+        "the way home would be blocked: there is no route from the aircraft to its take-off point");
   const auto& waypoints = setup.settings.waypoints;
   const auto next = proposal.next;
   if (next < waypoints.size() && !planning::route(bounds, *position_m, waypoints[next].point_m))
-    out.push_back(words("there is no route from the aircraft to waypoint %.0f, the next",
+    out.push_back(words("there is no route from the aircraft to the next waypoint, %.0f",
                         static_cast<double>(proposal.change.next + 1)));
   return out;
 }

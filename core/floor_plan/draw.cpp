@@ -182,7 +182,7 @@ double unit_at(const Vector2d& site_map_m, double unit_m, const Box& box) {
 Result<DrawnPlan> draw_plan(const Drawing& drawing, const std::optional<Vector2d>& site_map_m) {
   const auto lines = drawing.lines.empty() ? drawing.lines : without_strays(drawing.lines);
   const auto nothing =
-      make_error(Errc::weak_geometry, "the drawing has no size: its lines are all in one place");
+      make_error(Errc::weak_geometry, "the drawing has no size: all its lines are at one point");
   if (lines.empty()) return nothing;
   const auto box = box_of(lines);
   if (box.longest() <= 0) return nothing;

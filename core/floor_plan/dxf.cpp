@@ -172,8 +172,8 @@ class Reader {
     BOOST_OUTCOME_TRYV(draw(*entities, {}));
     if (out_.lines.empty())
       return make_error(Errc::weak_geometry,
-                        "the DXF shows no line in its model space: switch its layers on, or explode what "
-                        "refers to other files");
+                        "the DXF shows no line in its model space: switch its layers on, or bind external "
+                        "references (XREF)");
     return std::move(out_);
   }
 
@@ -379,9 +379,9 @@ class Reader {
   }
 
   static Error too_much() {
-    return make_error(Errc::invalid_argument, "the DXF unfolds to more than " +
+    return make_error(Errc::invalid_argument, "the DXF expands to more than " +
                                                   std::to_string(k_max_drawn_lines / 1'000'000) +
-                                                  " million lines: save one floor alone");
+                                                  " million lines: save a single floor");
   }
 
   std::string_view text_;

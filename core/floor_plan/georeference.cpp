@@ -62,12 +62,13 @@ Result<void> check(std::span<const PixelPair> pairs, FitModel model) {
   if (pixels.spread[0] < k_min_spread_px || ground.spread[0] < k_min_spread_m)
     return make_error(
         Errc::weak_geometry,
-        text("the points lie at one place (spread %.1f pixels, %.2f m): click corners far apart",
+        text("the points are too close together (spread %.1f pixels, %.2f m): click corners far apart",
              pixels.spread[0], ground.spread[0]));
   if (model == FitModel::affine && (pixels.spread[1] < k_min_line_ratio * pixels.spread[0] ||
                                     ground.spread[1] < k_min_line_ratio * ground.spread[0]))
-    return make_error(Errc::weak_geometry,
-                      "the points lie on one line: an affine fit needs a point off it (or fit helmert)");
+    return make_error(
+        Errc::weak_geometry,
+        "the points lie on one line: an affine fit needs a point off that line (or use the model helmert)");
   return boost::outcome_v2::success();
 }
 
@@ -156,15 +157,14 @@ void name_the_wrong(std::span<const PixelPair> pairs, const std::vector<LeftOut>
                     const PlanFitOptions& options, PlanFit& fit) {
   if (fit.redundancy <= 0) {
     fit.notes.emplace_back(
-        "no redundant point: the residuals are zero by construction and prove nothing; click one more");
+        "no redundant point: the residuals are zero by construction and prove nothing; click one more point");
     return;
   }
   double worst = 0;
   for (const auto& one : fit.residuals) worst = std::max(worst, one.residual_m.norm());
   if (worst <= options.agreement_m) {
     if (fit.redundancy < 3)
-      fit.notes.emplace_back(
-          "the points agree; a fourth would also show which one is wrong when they do not");
+      fit.notes.emplace_back("the points agree; with a fourth point, a wrong one could be identified too");
     return;
   }
   const bool all = std::all_of(tries.begin(), tries.end(), [](const LeftOut& t) { return t.solved; });
@@ -181,12 +181,12 @@ void name_the_wrong(std::span<const PixelPair> pairs, const std::vector<LeftOut>
   } else if (fit.redundancy <= 2) {
     fit.notes.push_back(
         text("the points disagree by up to %.2f m, and %.0f points cannot show which one is "
-             "wrong: click a further one, or give the plan's scale",
+             "wrong: click another one, or give the plan's scale",
              worst, static_cast<double>(pairs.size())));
   } else {
     fit.notes.push_back(
         text("the points disagree by up to %.2f m (limit %.2f m), and no single one explains "
-             "it: check all of them, or fit affine where the plan is a photograph",
+             "it: check all of them, or use the model affine if the plan is a photograph",
              worst, options.agreement_m));
   }
 }
@@ -217,18 +217,18 @@ Result<PlanFit> fit_plan(std::span<const PixelPair> pairs, const PlanFitOptions&
   }
   name_the_wrong(pairs, tries, options, fit);
   if (options.model == FitModel::affine && fit.transform.linear.determinant() > 0)
-    fit.notes.emplace_back("the fit turns the plan over: are two points swapped?");
+    fit.notes.emplace_back("the fit mirrors the plan: are two points swapped?");
   if (options.model == FitModel::helmert && pairs.size() > 2) {
     const double over = rms(pairs, solve(pairs, options.model, true));
     if (over < 0.2 * fit.rms_m && fit.rms_m > options.agreement_m)
       fit.notes.push_back(
-          text("seen from below the points fit within %.2f m instead of %.2f m: are two of "
-               "them swapped, or is the plan mirrored?",
+          text("with the plan mirrored the points fit within %.2f m instead of %.2f m: are two of them "
+               "swapped, or is the plan seen from below?",
                over, fit.rms_m));
   }
   if (options.known_scale_m_per_px &&
       std::abs(fit.transform.scale_m_per_px() / *options.known_scale_m_per_px - 1) > options.scale_agreement)
-    fit.notes.push_back(text("the points give %.5f m per pixel, the known length %.5f",
+    fit.notes.push_back(text("the points give %.5f m per pixel, the known length gives %.5f m per pixel",
                              fit.transform.scale_m_per_px(), *options.known_scale_m_per_px));
   return fit;
 }

@@ -163,7 +163,7 @@ Result<Image> decode_tiff(Bytes bytes, const ImageHead& head) {
   if (!tiff) return broken(file.fault);
   char why[1024] = "";
   if (TIFFRGBAImageOK(tiff.get(), why) == 0)
-    return make_error(Errc::unsupported, std::string("this kind of TIFF is not read (") + why +
+    return make_error(Errc::unsupported, std::string("this kind of TIFF is not supported (") + why +
                                              "): save it as 8-bit RGB or grey");
   std::vector<std::uint32_t> raster(static_cast<std::size_t>(head.width_px * head.height_px));
   if (TIFFReadRGBAImageOriented(tiff.get(), static_cast<std::uint32_t>(head.width_px),

@@ -197,7 +197,7 @@ Result<ImageHead> head_of(Bytes bytes) {
   if (begins(bytes, k_tiff_big)) return tiff_head(bytes, true);
   const char* what = begins(bytes, k_bigtiff_little) || begins(bytes, k_bigtiff_big)
                          ? "a BigTIFF, which is not accepted"
-                         : "no PNG, JPEG, TIFF, PDF or DXF";
+                         : "not a PNG, JPEG, TIFF, PDF or DXF";
   return make_error(
       Errc::unsupported,
       std::string("the file is ") + what +
@@ -216,7 +216,7 @@ Result<ImageHead> image_head(Bytes bytes) {
                                                   std::to_string(head.height_px) + " pixels (limit " +
                                                   std::to_string(k_max_image_side_px) + " a side, " +
                                                   std::to_string(k_max_image_pixels / 1'000'000) +
-                                                  " million in all): scale it down, or send one floor alone");
+                                                  " million in all): scale it down, or send a single floor");
   return head;
 }
 

@@ -36,11 +36,10 @@ Result<Grid> grid_of(const Image& image, const PlanTransform& transform) {
   g.m_per_px = {transform.linear.col(0).norm(), transform.linear.col(1).norm()};
   const double px = g.m_per_px.maxCoeff();
   if (!(px > 1e-4) || px > k_coarsest_m)
-    return make_error(
-        Errc::invalid_argument,
-        text("a pixel of the plan is %.4f m: walls are traced between 0.0001 and %.2f m a pixel; "
-             "check the georeference, or scan the plan finer",
-             px, k_coarsest_m));
+    return make_error(Errc::invalid_argument,
+                      text("a pixel of the plan is %.4f m: walls are traced between 0.0001 and %.2f m per "
+                           "pixel; check the georeference, or scan the plan at a higher resolution",
+                           px, k_coarsest_m));
   const Eigen::Vector2d extent(image.width_px * g.m_per_px.x(), image.height_px * g.m_per_px.y());
   // Coarse plans are refined by a whole number, so that their pixels stay what they are.
   if (px > k_cell_m) g.cell_m = px / std::ceil(px / (1.5 * k_cell_m));
@@ -69,7 +68,7 @@ Result<cv::Mat> thick_ink(const cv::Mat& grey, const Grid& g, const TraceOptions
   if (lightest - darkest < 40 || share < 1e-4 || share > 0.6)
     return make_error(Errc::weak_geometry,
                       text("the plan has no dark lines on light paper (%.1f %% ink, contrast %.0f of 255): "
-                           "a drawing is traced, not a photograph",
+                           "only a drawing can be traced, not a photograph",
                            100 * share, lightest - darkest));
   // Odd: with an even kernel OpenCV's opening moves everything by one cell.
   const int fits = static_cast<int>(std::floor(options.min_wall_m / g.cell_m));
@@ -137,15 +136,14 @@ Result<Trace> trace_checked(const Image& rgb, const PlanTransform& transform, co
   for (const auto& contour : faces) total += contour.size();
   if (total > how.most)
     return make_error(Errc::weak_geometry,
-                      "the plan has more than 20000 edges as thick as a wall: a drawing is traced, not a "
-                      "photograph; take hatching and textures out");
+                      "the plan has more than 20000 edges as thick as a wall: only a drawing can be traced, "
+                      "not a photograph; remove hatching and textures");
   const auto lines = wall_lines(faces, mask, options);
   if (lines.empty())
-    return make_error(
-        Errc::weak_geometry,
-        text("no walls found: they must be filled with ink, %.2f to %.2f m thick; walls drawn as "
-             "two thin lines are not traced, fill them first",
-             options.min_wall_m, options.max_wall_m));
+    return make_error(Errc::weak_geometry,
+                      text("no walls found: walls must be drawn filled, %.2f to %.2f m thick; walls drawn as "
+                           "two thin lines are not traced, fill them first",
+                           options.min_wall_m, options.max_wall_m));
   if (!goes_on(0.7, "outline")) return stopped();
   Trace out;
   out.cell_m = grid.cell_m;
@@ -160,8 +158,8 @@ Result<Trace> trace_checked(const Image& rgb, const PlanTransform& transform, co
     out.walls.push_back({enu(line.begin_m()), enu(line.end_m()), line.thickness_m});
   }
   if (grid.cell_m > 0.025)
-    out.notes.push_back(
-        text("traced on cells of %.3f m: walls below %.2f m may be missing", grid.cell_m, 3 * grid.cell_m));
+    out.notes.push_back(text("traced on a grid of %.3f m cells: walls thinner than %.2f m may be missing",
+                             grid.cell_m, 3 * grid.cell_m));
   return out;
 }
 
@@ -171,7 +169,7 @@ Result<Trace> trace_plan(const Image& rgb, const PlanTransform& transform, const
                          const TraceProgress& progress) {
   if (rgb.channels != 3 || rgb.pixels.size() != 3 * static_cast<std::size_t>(rgb.width_px) *
                                                     static_cast<std::size_t>(rgb.height_px))
-    return make_error(Errc::invalid_argument, "the image is no RGB picture");
+    return make_error(Errc::invalid_argument, "the image is not an RGB picture");
   // One thread: whoever flies beside needs the other cores.
   cv::setNumThreads(1);
   try {

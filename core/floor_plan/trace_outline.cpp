@@ -224,23 +224,24 @@ Result<std::vector<Eigen::Vector2d>> building_outline(const Mask& walls, const s
     building = rough;
     cells = rough_cells;
     notes.emplace_back(
-        "the outer walls have gaps that are no doors: the outline is rounded there; check its corners");
+        "the outer walls have gaps that are not doors: the outline is rounded there; check its corners");
   } else if (second > 0.2 * cells) {
     notes.emplace_back("the plan shows more than one building: the outline is of the largest");
   }
   const double area = cells * work.cell_m * work.cell_m;
   if (area < k_least_area_m2)
-    return make_error(Errc::weak_geometry, "the walls of the plan enclose nothing: draw the outline by hand");
+    return make_error(Errc::weak_geometry, "the walls of the plan enclose no area: draw the outline by hand");
   building.copyTo(ink);
   const FaceOptions how{.tolerance_m = k_tolerance_m, .trim_m = 0.2, .outer_only = true, .turn_rad = 0.03};
   const auto contours = faces_of(work, how, main_rad);
-  if (contours.empty()) return make_error(Errc::weak_geometry, "the plan shows no building");
+  if (contours.empty())
+    return make_error(Errc::weak_geometry, "the plan shows no building: draw the outline by hand");
   const auto& longest = *std::ranges::max_element(contours, {}, &std::vector<Face>::size);
   auto corners = corners_of(longest);
   if (corners.size() < 3 || std::abs(area_m2(corners) / area - 1) > 0.03) {
     corners.clear();
     for (const auto& face : longest) corners.push_back(face.begin_m());
-    notes.emplace_back("the outline has few straight pieces: it is given as it is drawn");
+    notes.emplace_back("the outline has few straight edges: it is taken as drawn, not straightened");
   }
   return corners;
 }

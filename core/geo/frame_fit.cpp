@@ -84,13 +84,14 @@ Result<void> check_geometry(const Centred& c, const FrameFitOptions& options) {
     const Eigen::Vector3d sd = spread(*points, options.model);
     if (sd[0] < options.min_spread_m)
       return make_error(Errc::weak_geometry,
-                        std::string("the pairs lie at one place of the ") + frame +
+                        std::string("the pairs are too close together in the ") + frame +
                             text(" frame: spread %.3f m, need %.2f m", sd[0], options.min_spread_m));
     if (options.model == FrameModel::seven && sd[1] < options.min_line_ratio * sd[0])
-      return make_error(Errc::weak_geometry,
-                        std::string("the pairs lie on one line of the ") + frame +
-                            text(" frame (%.3f m across, %.2f m along): the turn about it is not determined",
-                                 sd[1], sd[0]));
+      return make_error(
+          Errc::weak_geometry,
+          std::string("the pairs lie on one line in the ") + frame +
+              text(" frame (%.3f m across, %.2f m along): the rotation about it is not determined", sd[1],
+                   sd[0]));
   }
   return boost::outcome_v2::success();
 }
@@ -198,7 +199,7 @@ void add_notes(std::span<const FramePair> pairs, const Centred& c, const FrameFi
                  mirrored = plane_rms(c, options.fit_scale, true);
     if (mirrored < 0.2 * straight && straight > 0.05)
       fit.notes.push_back(
-          text("with one local axis turned round the pairs fit within %.3f m instead of %.3f m: "
+          text("with one local axis reversed the pairs fit within %.3f m instead of %.3f m: "
                "is the local frame left-handed, or are two columns swapped?",
                mirrored, straight));
   }
@@ -207,9 +208,9 @@ void add_notes(std::span<const FramePair> pairs, const Centred& c, const FrameFi
         text("the local z axis points %.0f degrees away from up: is the local frame left-handed?",
              fit.transform.tilt_deg()));
   if (options.fit_scale && std::abs(fit.transform.scale - 1) > 0.02)
-    fit.notes.push_back(
-        text("scale %.4f: a metre of the local frame is no metre; check its unit and its ranging",
-             fit.transform.scale));
+    fit.notes.push_back(text(
+        "scale %.4f: one unit of the local frame is not one metre; check its unit and its range calibration",
+        fit.transform.scale));
   std::size_t worst = 0;
   double worst_m = 0, rest = 0;
   for (std::size_t i = 0; i < fit.residuals.size(); ++i) {

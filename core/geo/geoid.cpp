@@ -54,7 +54,7 @@ Result<Geoid> Geoid::open(const std::string& folder) {
 
 Result<double> Geoid::undulation_m(const Wgs84& at) const {
   if (!std::isfinite(at.lon_deg) || !(std::abs(at.lat_deg) <= 90))
-    return make_error(Errc::invalid_argument, "no place on the globe");
+    return make_error(Errc::invalid_argument, "not a position on the globe");
   const auto grid = model_->grid.lock();
   try {
     return (*grid)(at.lat_deg, at.lon_deg);

@@ -80,8 +80,8 @@ Result<Projection> Projection::open(int epsg, int geographic_epsg) {
   PJ_CONTEXT* context = made->context;
   const Owned target{proj_create(context, code(epsg).c_str())};
   const Owned source{proj_create(context, code(geographic_epsg).c_str())};
-  if (target.pj == nullptr) return make_error(Errc::not_found, "PROJ knows no " + code(epsg));
-  if (source.pj == nullptr) return make_error(Errc::not_found, "PROJ knows no " + code(geographic_epsg));
+  if (target.pj == nullptr) return make_error(Errc::not_found, "PROJ does not know " + code(epsg));
+  if (source.pj == nullptr) return make_error(Errc::not_found, "PROJ does not know " + code(geographic_epsg));
   const char* given = proj_get_name(target.pj);
   std::string name = given != nullptr ? given : code(epsg);
   if (proj_get_type(target.pj) != PJ_TYPE_PROJECTED_CRS)
@@ -92,15 +92,15 @@ Result<Projection> Projection::open(int epsg, int geographic_epsg) {
     proj_coordoperation_get_method_info(context, conversion.pj, &method, nullptr, nullptr);
   // PROJ computes this method without its rotation of 29.3", which is 745 m in EPSG:31300.
   if (method != nullptr && std::string_view(method).find("2SP Belgium") != std::string_view::npos)
-    return make_error(Errc::unsupported, name + " is not computed rightly by PROJ; take EPSG:31370");
+    return make_error(Errc::unsupported, name + " is not computed correctly by PROJ; use EPSG:31370");
   const char* const options[] = {"ALLOW_BALLPARK=NO", nullptr};
   const Owned found{proj_create_crs_to_crs_from_pj(context, source.pj, target.pj, nullptr, options)};
   if (found.pj == nullptr)
-    return make_error(Errc::unsupported,
-                      "no way from " + code(geographic_epsg) + " to " + name + " with the grids installed");
+    return make_error(Errc::unsupported, "no transformation from " + code(geographic_epsg) + " to " + name +
+                                             " with the grids installed");
   // Longitude and easting first, in whatever order the register has the axes.
   made->operation = proj_normalize_for_visualization(context, found.pj);
-  if (made->operation == nullptr) return make_error(Errc::unsupported, name + ": axes not understood");
+  if (made->operation == nullptr) return make_error(Errc::unsupported, name + ": its axes are not supported");
   return Projection(epsg, std::move(name), std::move(pipeline));
 }
 
@@ -110,7 +110,7 @@ Result<Eigen::Vector2d> Projection::easting_northing_m(const Wgs84& at) const {
       proj_trans(use->operation, PJ_FWD, proj_coord(at.lon_deg, at.lat_deg, at.height_m, HUGE_VAL));
   if (!std::isfinite(out.xy.x) || !std::isfinite(out.xy.y)) {
     proj_errno_reset(use->operation);
-    return make_error(Errc::invalid_argument, "the place lies outside " + name_);
+    return make_error(Errc::invalid_argument, "the position is outside " + name_);
   }
   return Eigen::Vector2d(out.xy.x, out.xy.y);
 }
@@ -121,7 +121,7 @@ Result<Wgs84> Projection::geographic(const Eigen::Vector2d& easting_northing_m, 
       use->operation, PJ_INV, proj_coord(easting_northing_m.x(), easting_northing_m.y(), height_m, HUGE_VAL));
   if (!std::isfinite(out.xy.x) || !std::isfinite(out.xy.y)) {
     proj_errno_reset(use->operation);
-    return make_error(Errc::invalid_argument, "the place lies outside " + name_);
+    return make_error(Errc::invalid_argument, "the position is outside " + name_);
   }
   return Wgs84{out.xy.y, out.xy.x, height_m};
 }

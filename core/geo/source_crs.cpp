@@ -139,7 +139,7 @@ Result<void> check_area(PJ_CONTEXT* context, const PJ* crs, const std::string& s
       "longitudes %.1f to %.1f of ",
       place.lat_deg, place.lon_deg, south, north, west, east);
   return make_error(Errc::invalid_argument,
-                    text + shown + ": another system or zone, or easting and northing exchanged?");
+                    text + shown + ": is it another system or zone, or are easting and northing exchanged?");
 }
 
 std::string metres(double value_m) {
@@ -205,7 +205,7 @@ Result<void> SourceCrs::find_horizontal(Operations& of, PJ* crs, const SourceCrs
     if (of.horizontal.pj == nullptr || best_m > 0) consider(target);
   }
   if (of.horizontal.pj == nullptr)
-    return make_error(Errc::unsupported, "no way from " + name_ +
+    return make_error(Errc::unsupported, "no transformation from " + name_ +
                                              " to ETRS89 or WGS84 at the first position with the grids "
                                              "installed, or the position lies outside the system");
   datum_error_m_ = best_m;
@@ -222,15 +222,15 @@ Result<void> SourceCrs::find_vertical(Operations& of, const SourceCrsSpec& spec,
                                       const Eigen::Vector3d& first) {
   heights_ = "above the ellipsoid";
   if (spec.separation_m)
-    heights_ += ", made of heights above a geoid " + metres(*spec.separation_m) + " above it";
+    heights_ += ", computed from heights above a geoid " + metres(*spec.separation_m) + " above it";
   if (!spec.height_epsg) return boost::outcome_v2::success();
   const ProjHandle vertical{proj_create(of.context, epsg_text(*spec.height_epsg).c_str())};
   if (vertical.pj == nullptr)
-    return make_error(Errc::not_found, "PROJ knows no " + epsg_text(*spec.height_epsg));
+    return make_error(Errc::not_found, "PROJ does not know " + epsg_text(*spec.height_epsg));
   const std::string name = name_of(vertical.pj);
   if (proj_get_type(vertical.pj) != PJ_TYPE_VERTICAL_CRS)
     return make_error(Errc::invalid_argument, epsg_text(*spec.height_epsg) + " (" + name +
-                                                  ") is no system of heights, such as EPSG:5773 (EGM96)");
+                                                  ") is not a vertical system, such as EPSG:5773 (EGM96)");
   BOOST_OUTCOME_TRY(const Wgs84 flat, converted(of, first));
   for (const auto& [flat_epsg, full_epsg] : {std::pair{4326, 4979}, {4258, 4937}}) {
     const std::string both = epsg_text(flat_epsg) + "+" + std::to_string(*spec.height_epsg);
@@ -241,11 +241,12 @@ Result<void> SourceCrs::find_vertical(Operations& of, const SourceCrsSpec& spec,
         operation_at(of.context, from.pj, to.pj, proj_coord(flat.lon_deg, flat.lat_deg, first.z(), HUGE_VAL));
     if (of.vertical.pj == nullptr) continue;
     const double error_m = proj_coordoperation_get_accuracy(of.context, of.vertical.pj);
-    heights_ += ", made of " + name + (error_m > 0 ? " (error " + metres(error_m) + ")" : "");
+    heights_ += ", computed from " + name + (error_m > 0 ? " (error " + metres(error_m) + ")" : "");
     return boost::outcome_v2::success();
   }
-  return make_error(Errc::unsupported, "no grid is installed that makes a height above the ellipsoid of " +
-                                           name + ": give the height of the geoid there in metres instead");
+  return make_error(Errc::unsupported,
+                    "no grid is installed to convert heights of " + name +
+                        " to ellipsoidal heights: give the height of the geoid there in metres instead");
 }
 
 Result<void> SourceCrs::prepare(const SourceCrsSpec& spec, const Eigen::Vector3d& first) {
@@ -258,7 +259,7 @@ Result<void> SourceCrs::prepare(const SourceCrsSpec& spec, const Eigen::Vector3d
   auto made = operations_->lock();
   PJ_CONTEXT* context = made->context;
   ProjHandle crs{proj_create(context, epsg_text(*epsg).c_str())};
-  if (crs.pj == nullptr) return make_error(Errc::not_found, "PROJ knows no " + epsg_text(*epsg));
+  if (crs.pj == nullptr) return make_error(Errc::not_found, "PROJ does not know " + epsg_text(*epsg));
   name_ = name_of(crs.pj);
   const std::string shown = epsg_text(*epsg) + " (" + name_ + ")";
   const PJ_TYPE type = proj_get_type(crs.pj);
@@ -267,10 +268,10 @@ Result<void> SourceCrs::prepare(const SourceCrsSpec& spec, const Eigen::Vector3d
   if (type == PJ_TYPE_COMPOUND_CRS)
     return make_error(Errc::invalid_argument,
                       shown +
-                          " has heights too: give its horizontal system here, and its vertical one as that "
-                          "of the heights");
+                          " has heights too: give its horizontal system as the coordinate system and its "
+                          "vertical system as that of the heights");
   if (!projected_ && !geocentric_ && type != PJ_TYPE_GEOGRAPHIC_2D_CRS && type != PJ_TYPE_GEOGRAPHIC_3D_CRS)
-    return make_error(Errc::invalid_argument, shown + " is no system of positions");
+    return make_error(Errc::invalid_argument, shown + " is not a coordinate system of positions");
   // Heights go their own way.
   const auto own = std::ranges::find(k_own_datums, *epsg, &OwnDatum::full_epsg);
   if (own != k_own_datums.end()) crs = ProjHandle(proj_create(context, epsg_text(own->flat_epsg).c_str()));
@@ -280,7 +281,7 @@ Result<void> SourceCrs::prepare(const SourceCrsSpec& spec, const Eigen::Vector3d
     proj_coordoperation_get_method_info(context, conversion.pj, &method, nullptr, nullptr);
   // PROJ computes this method without its rotation of 29.3", which is 745 m in EPSG:31300.
   if (method != nullptr && std::string_view(method).find("2SP Belgium") != std::string_view::npos)
-    return make_error(Errc::unsupported, shown + " is not computed rightly by PROJ; take EPSG:31370");
+    return make_error(Errc::unsupported, shown + " is not computed correctly by PROJ; use EPSG:31370");
   if (geocentric_) {
     if (spec.height_epsg || spec.separation_m)
       return make_error(Errc::invalid_argument,
@@ -301,7 +302,7 @@ Result<SourceCrs> SourceCrs::open(const SourceCrsSpec& spec, const Eigen::Vector
 }
 
 Result<Wgs84> SourceCrs::converted(Operations& operations, const Eigen::Vector3d& at) const {
-  const auto outside = [&] { return make_error(Errc::invalid_argument, "the place lies outside " + name_); };
+  const auto outside = [&] { return make_error(Errc::invalid_argument, "the position is outside " + name_); };
   if (!at.allFinite()) return outside();
   if (geocentric_) {
     const Wgs84 place = wgs84_from_ecef(at);

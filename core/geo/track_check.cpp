@@ -156,8 +156,9 @@ std::vector<std::size_t> keep_flight(const std::vector<Fix>& all, const std::vec
       char text[160];
       const auto& s = segments.segment(part[k]);
       std::snprintf(text, sizeof text,
-                    "%zu positions over %.0f s are off the flight as a whole (base moved?) from ", s.n,
-                    s.last_s - s.first_s);
+                    "%zu positions over %.0f s are shifted together against the rest of the flight (base "
+                    "moved?), from ",
+                    s.n, s.last_s - s.first_s);
       out.notes.push_back(text + when(all[good[k]]) + ": left out");
     }
   }

@@ -75,7 +75,7 @@ FlightOptions raw_options(const FlightOptions& options) {
 }  // namespace
 
 Result<Convergence> convergence_of(const FlightData& flight, const FlightOptions& options, int steps) {
-  if (steps < 1 || steps > 50) return make_error(Errc::invalid_argument, "1 to 50 iterations");
+  if (steps < 1 || steps > 50) return make_error(Errc::invalid_argument, "iterations must be 1 to 50");
   BOOST_OUTCOME_TRYV(options.check());
   const FlightData whole = in_time_order(flight);
   const std::vector<Range>& all = whole.ranges;

@@ -76,8 +76,8 @@ std::string CorrectionWorth::text() const {
   char text[200];
   std::snprintf(
       text, sizeof text,
-      "%+.3f in ln likelihood per range with a sigma of %.3f over %zu ranges (at least %+.3f is asked)", gain,
-      sigma, n_ranges, k_sure * sigma);
+      "%+.3f in ln likelihood per range with a sigma of %.3f over %zu ranges (at least %+.3f is required)",
+      gain, sigma, n_ranges, k_sure * sigma);
   return text;
 }
 

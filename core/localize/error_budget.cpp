@@ -108,7 +108,7 @@ std::string_view source_text(ErrorSource source) {
     case ErrorSource::base:
       return "base station";
     case ErrorSource::floor:
-      return "what no residual shows";
+      return "errors that no residual shows";
   }
   return "";
 }

@@ -53,11 +53,12 @@ Result<std::optional<Gate>> check_lever_arm(const FlightRows& rows, const JointF
               found.shared_covariance.block<2, 2>(k_shared_forward, k_shared_forward));
     if (!arm.beyond(k_arm_z)) return std::optional<Gate>{};
   }
-  return std::optional<Gate>{
-      Gate{"lever_arm", arm.z, k_arm_z, false,
-           sentence("the ranges speak against the declared lever arm: %+.2f m forward, %+.2f m left of it "
-                    "(%.1f sigma)",
-                    arm.arm_m.x(), arm.arm_m.y(), arm.z)}};
+  return std::optional<Gate>{Gate{
+      "lever_arm", arm.z, k_arm_z, false,
+      sentence(
+          "the ranges contradict the declared lever arm: they fit one %+.2f m forward, %+.2f m left of it "
+          "(%.1f sigma)",
+          arm.arm_m.x(), arm.arm_m.y(), arm.z)}};
 }
 
 Gate check_profile(const ProfileFactor& alone, std::span<const ProfileFactor> others,
@@ -86,16 +87,16 @@ Gate check_profile(const ProfileFactor& alone, std::span<const ProfileFactor> ot
   // Each by itself too: what three of them have in common does not excuse the fourth.
   const double limit = chi2_quantile(GateLimits{}.agreement, 4);
   return {"profile", chi2, limit, chi2 <= limit && z <= k_profile_z,
-          sentence("against the kit's other flights: chi2 %.1f; most in the %s, %+.3f (%.1f sigma)", chi2,
-                   what[static_cast<std::size_t>(oddest)], apart[oddest], z)};
+          sentence("differs from the kit's other flights: chi2 %.1f; most in the %s, by %+.3f (%.1f sigma)",
+                   chi2, what[static_cast<std::size_t>(oddest)], apart[oddest], z)};
 }
 
 Gate check_steps(double share, const FlightOptions& options) {
   const double limit = options.track.max_step_share;
-  return {
-      "track", share, limit, share <= limit,
-      sentence("%.1f %% of the positions are off the others as a whole, limit %.1f %%: did the base move?",
-               100 * share, 100 * limit)};
+  return {"track", share, limit, share <= limit,
+          sentence("%.1f %% of the positions are shifted together against the others, limit %.1f %%: did the "
+                   "base move?",
+                   100 * share, 100 * limit)};
 }
 
 }  // namespace anchord

@@ -58,7 +58,7 @@ Result<std::optional<EnuFrame>> frame_of(const std::optional<Wgs84>& centre, con
                       "the middle of the track is " + std::to_string(std::llround(far_m / 1000)) +
                           " km from the origin, more than the " +
                           std::to_string(std::llround(options.track.max_distance_m / 1000)) +
-                          " km of any flight: check the site's origin");
+                          " km allowed: check the site's origin");
   return std::optional(frame);
 }
 

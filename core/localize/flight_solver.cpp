@@ -145,9 +145,9 @@ void set_arm_sigma(const FlightData& flight, Work& work) {
   work.options.lever_arm_sigma_m = k_undeclared_arm_sigma_m;
   work.rows.notes.push_back(
       sentence("the track has no attitude and no lever arm is declared: a tag %.1f m beside the track point "
-               "would move every anchor by up to %.1f m, and no range would show it, so the regions hold "
-               "%.2f m (one sigma) for it: declare the lever arm, zeros too, or how well it is known "
-               "(lever_arm_sigma_m)",
+               "would move every anchor by up to %.1f m, and no range would show it, so the regions include "
+               "%.2f m (one sigma) for it: declare the lever arm, even if it is zero, or how well it is "
+               "known (lever_arm_sigma_m)",
                k_arm_asked_m, k_arm_asked_m, k_undeclared_arm_sigma_m));
 }
 
@@ -157,7 +157,8 @@ void note_unused(std::vector<Work>& all, const FlightOptions& options) {
     Work& work = all[i];
     for (std::size_t k = 0; k < i; ++k) {
       if (all[k].digest != work.digest) continue;
-      work.rows.notes.push_back("the same flight as " + all[k].name + ", to the last range: it counts once");
+      work.rows.notes.push_back("the same flight as " + all[k].name +
+                                ", with identical ranges: it counts once");
       break;
     }
     if (options.profile && !profile_fits(work, options)) {
@@ -251,7 +252,7 @@ FlightSolution describe(Work& work, const FlightData& flight) {
   }
   if (const std::size_t n = n_believed(work.rows); n > 0) {
     solution.notes.push_back(std::to_string(n) +
-                             " ranges were weighed by the likelihood of a model, not by the loss");
+                             " ranges were weighted by the likelihood of a model, not by the loss");
   }
   if (!solution.shared.bias_determined) {
     solution.notes.push_back(
@@ -262,7 +263,7 @@ FlightSolution describe(Work& work, const FlightData& flight) {
     if (!check.passed) solution.notes.push_back(check.why);
   }
   if (!work.fit.converged) {
-    solution.notes.push_back("the joint solve did not settle within " + std::to_string(work.fit.rounds) +
+    solution.notes.push_back("the joint solve did not converge within " + std::to_string(work.fit.rounds) +
                              " rounds");
   }
   auto budgets = error_budgets(work.rows, work.fit, work.prior, options);
@@ -312,8 +313,8 @@ Result<void> FlightOptions::check() const {
     return make_error(Errc::invalid_argument,
                       "a height prior needs three dimensions: set dims to 3, or hold the height instead");
   if (fixed_bias_m && !(std::abs(*fixed_bias_m) <= k_most_bias_m)) {
-    return make_error(Errc::invalid_argument, "range bias " + std::to_string(*fixed_bias_m) +
-                                                  " m: in metres, at most 200 either way");
+    return make_error(Errc::invalid_argument,
+                      "range bias " + std::to_string(*fixed_bias_m) + " m: must be -200 to 200 m");
   }
   if (good) return boost::outcome_v2::success();
   return make_error(Errc::invalid_argument,
@@ -383,7 +384,7 @@ Result<std::vector<FlightSolution>> solve_flights(std::span<const FlightData* co
     if (const std::size_t n = add_sector_doubt(work.rows, work.options, work.fit))
       work.rows.notes.push_back(std::to_string(n) + " of " + std::to_string(work.rows.anchors.size()) +
                                 " anchors are less certain because their ranges fit better if those from one "
-                                "side are late: an obstacle there may lengthen them");
+                                "side are too long: an obstacle there may lengthen them");
   }
   for (std::size_t i = 0; i < all.size(); ++i) {
     Work& work = all[i];

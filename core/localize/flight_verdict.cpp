@@ -177,8 +177,8 @@ void assess_mirrors(const FlightRows& flight, AnchorSolution& solution, const st
   if (!mirror) {
     // No second minimum of its own, but a plane cannot tell the sides: what its reflection says is as good.
     const Eigen::Vector3d reflected = geometry.shape.mirrored(estimate.best->position.m);
-    estimate.reason =
-        geometry.reason + "; the side of it the anchor is on is not determined, its height is uncertain";
+    estimate.reason = geometry.reason +
+                      "; it is not determined on which side of it the anchor is, and its height is uncertain";
     const double apart_m = (reflected - estimate.best->position.m).norm();
     const double odds =
         std::exp(-std::clamp(priors.cost(reflected) - priors.cost(estimate.best->position.m), -50.0, 50.0));
@@ -279,7 +279,7 @@ AnchorSolution verdict_of(const FlightRows& flight, const JointFit& fit, std::si
       (anchor.position_m - geometry.shape.centroid_m).norm() > 3.0 * options.max_range_m) {
     estimate.verdict = Verdict::diverged;
     estimate.reason =
-        text("no consistent answer: typical residual %.2f m at a median range of %.2f m over %.0f ranges",
+        text("no consistent position: typical residual %.2f m at a median range of %.2f m over %.0f ranges",
              block.scale_m, geometry.median_range_m, static_cast<double>(block.n_in_track));
     return solution;
   }

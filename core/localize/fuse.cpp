@@ -87,7 +87,7 @@ Estimate fuse_estimates(std::span<const Estimate> estimates) {
     const Gate agreement = flights_gate(chi2, n_ok);
     if (!agreement.passed) {
       out.verdict = Verdict::diverged;
-      out.reason = "flights contradict each other: " + agreement.why;
+      out.reason = "the flights contradict each other: " + agreement.why;
     }
     out.gates.push_back(agreement);
   }

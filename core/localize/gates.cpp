@@ -108,11 +108,10 @@ Lateness lateness_of(const JointFit& fit, std::size_t index, const FlightOptions
 /// the rest is drawn to theirs, and nobody is believed.
 Gate blocked(const JointFit& fit, std::size_t index, const FlightOptions& options, const GateLimits& limits) {
   const Lateness own = lateness_of(fit, index, options);
-  Gate gate =
-      at_most("blocked", own.scale_ratio, own.limit(limits),
-              text("residuals %.1f times those of the other anchors; left free, its ranges are %+.2f m "
-                   "long (%.1f sigma)",
-                   own.scale_ratio, own.delay_m, own.delay_z));
+  Gate gate = at_most("blocked", own.scale_ratio, own.limit(limits),
+                      text("residuals %.1f times those of the other anchors; with a range bias of its own, "
+                           "its ranges are %+.2f m too long (%.1f sigma)",
+                           own.scale_ratio, own.delay_m, own.delay_z));
   std::size_t n = 0, n_blocked = 0;
   for (std::size_t i = 0; i < fit.normal.anchors.size(); ++i) {
     if (!fit.state.anchors[i].active) continue;
@@ -121,7 +120,7 @@ Gate blocked(const JointFit& fit, std::size_t index, const FlightOptions& option
   }
   if (gate.passed && n_blocked > 1 && 4 * n_blocked >= n) {
     gate.passed = false;
-    gate.why += text("; %zu of %zu anchors stand out so", n_blocked, n);
+    gate.why += text("; %zu of %zu anchors stand out like this", n_blocked, n);
   }
   return gate;
 }
@@ -162,14 +161,14 @@ Gate halves(const FlightRows& flight, const JointFit& fit, std::size_t index, co
   const double limit = chi2_quantile(limits.probability, options.dims == Dims::two ? 2 : 3);
   if (!early || !late) {
     return {"halves", std::nullopt, limit, false,
-            std::string(early ? "the second" : "the first") + " half of the flight alone gives no answer"};
+            std::string(early ? "the second" : "the first") + " half of the flight alone gives no position"};
   }
   const Eigen::Vector3d apart = late->position_m - early->position_m;
   Eigen::Matrix3d both = early->covariance_m2 + late->covariance_m2;
   both.diagonal().array() += 2.0 * options.floor_sigma_m * options.floor_sigma_m + 1e-12;
   const double chi2 = apart.dot(both.ldlt().solve(apart));
   return at_most("halves", chi2, limit,
-                 text("the two halves of the flight put it %.2f m apart (%.2f m horizontally): chi2 %.1f",
+                 text("the two halves of the flight place it %.2f m apart (%.2f m horizontally): chi2 %.1f",
                       apart.norm(), apart.head<2>().norm(), chi2));
 }
 
@@ -205,13 +204,14 @@ std::vector<Gate> gates_of(const FlightRows& flight, const JointFit& fit, std::s
   const double spread = options.dims == Dims::two
                             ? solution.geometry.sigma_ratio
                             : largest_m / std::max(solution.geometry.median_range_m, 1e-3);
-  gates.push_back(
-      at_most("precision", spread, limits.precision, "largest sigma, of height too, over the median range"));
+  gates.push_back(at_most("precision", spread, limits.precision,
+                          "largest sigma (height included) over the median range"));
   const bool plane = options.dims == Dims::three && solution.determined == Determined::horizontal;
   const double side = plane && !estimate.mirror ? 0.5 : estimate.best->probability;
   gates.push_back(at_least("side", side, limits.side_probability,
-                           estimate.mirror ? "probability of this side; the other is given as mirror"
-                                           : "no mirror solution fits as well"));
+                           estimate.mirror
+                               ? "probability of this solution; the other one is given as the mirror solution"
+                               : "no mirror solution fits as well"));
   if (plane && !estimate.mirror) gates.back().why = "the track is a plane: height not determined";
   if (!options.outline_m.empty()) {
     const double outside_m = outside_outline_m(options.outline_m, estimate.best->position.m);
@@ -236,7 +236,7 @@ std::vector<Gate> gates_of(const FlightRows& flight, const JointFit& fit, std::s
       text("range bias of the kit %.3f m with sigma %.3f m", fit.state.shared[k_shared_bias], bias_sigma_m)));
   if (!fit.converged)
     gates.push_back(
-        {"settled", static_cast<double>(fit.rounds), 60, false, "the joint solve did not settle"});
+        {"settled", static_cast<double>(fit.rounds), 60, false, "the joint solve did not converge"});
   return gates;
 }
 
@@ -250,14 +250,14 @@ Gate moved_gate(const Estimate& now, const Estimate& before, const GateLimits& l
   if (!std::isfinite(chi2)) return {"flights", std::nullopt, limit, false, "a covariance is singular"};
   return at_most(
       "flights", chi2, limit,
-      text("%.3f m from the earlier answer (%.3f m horizontally): chi2 %.1f%s", apart.norm(),
-           apart.head<2>().norm(), chi2, chi2 > limit ? ", it moved or one of them is wrong" : ""));
+      text("%.3f m from the earlier position (%.3f m horizontally): chi2 %.1f%s", apart.norm(),
+           apart.head<2>().norm(), chi2, chi2 > limit ? ": it has moved, or one of the two is wrong" : ""));
 }
 
 Gate flights_gate(double chi2, std::size_t n_flights, const GateLimits& limits) {
   const double dof = 3.0 * static_cast<double>(n_flights - 1);
   return at_most("flights", chi2, chi2_quantile(limits.probability, dof),
-                 text("%zu flights about their common answer: chi2 %.1f with %.0f degrees of freedom",
+                 text("%zu flights around their common position: chi2 %.1f with %.0f degrees of freedom",
                       n_flights, chi2, dof));
 }
 

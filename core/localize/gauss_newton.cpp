@@ -104,7 +104,8 @@ Result<AnchorMinimum> descend_from(RangeBlock& block, const WarmStart& start, co
     minimum.settled = descent.settled;
     if (!descent.settled || block.one_scale() || (at - before).norm() < scale_tolerance_m) break;
   }
-  if (!at.allFinite()) return make_error(Errc::no_convergence, "the solver left the finite numbers");
+  if (!at.allFinite())
+    return make_error(Errc::no_convergence, "the solver reached a value that is not finite");
   minimum.position_m = at.head<3>();
   minimum.bias_m = at[3];
   return minimum;
@@ -135,7 +136,7 @@ Result<AnchorFit> solve_block(RangeBlock& block, const WarmStart& start, const S
   BOOST_OUTCOME_TRY(const AnchorMinimum minimum, descend_from(block, start, options, scale_tolerance_m));
   if (!minimum.settled) {
     return make_error(Errc::no_convergence,
-                      "not settled after " + std::to_string(minimum.iterations) + " Gauss-Newton steps");
+                      "not converged after " + std::to_string(minimum.iterations) + " Gauss-Newton steps");
   }
   Unknowns at;
   at << minimum.position_m, minimum.bias_m;
@@ -149,7 +150,7 @@ Result<AnchorFit> best_of_starts(RangeBlock& block, std::span<const Eigen::Vecto
   SolverOptions coarse = options;
   coarse.step_tolerance_m = coarse_m;
   std::vector<AnchorMinimum> ends;
-  Result<AnchorFit> best = make_error(Errc::no_convergence, "no start settled");
+  Result<AnchorFit> best = make_error(Errc::no_convergence, "no start converged");
   for (const auto& start : starts) {
     auto end = descend_to_minimum(block, start, coarse, coarse_m);
     if (end && end.value().settled) ends.push_back(end.value());

@@ -88,11 +88,12 @@ void answer_by(AnchorMethod method, const std::map<NetworkId, MethodAnswers>& an
     anchor.delay_sigma_m.reset();
     e.mirror.reset();
     e.bias_m = e.bias_sigma_m = e.lag_s = e.lag_sigma_s = std::nullopt;
-    e.gates = {{"method", std::nullopt, 0, false,
-                linear
-                    ? "linear least squares (eq 7.2 to 7.5), for comparison: neither bias, lag nor outliers"
-                    : "weighted least squares of each anchor alone (eq 7.10), for comparison: neither bias, "
-                      "lag nor outliers"}};
+    e.gates = {
+        {"method", std::nullopt, 0, false,
+         linear
+             ? "linear least squares (eq 7.2 to 7.5), for comparison: bias, lag and outliers are not handled"
+             : "weighted least squares of each anchor alone (eq 7.10), for comparison: bias, lag and "
+               "outliers are not handled"}};
     if (!place) {
       e.best.reset();
       e.verdict = Verdict::diverged;

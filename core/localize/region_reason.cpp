@@ -35,7 +35,8 @@ void name_largest_part(Estimate& estimate, const ErrorBudget& budget) {
   const auto precision = std::ranges::find(estimate.gates, "precision", &Gate::name);
   const bool wide = precision != estimate.gates.end() && !precision->passed;
   if (wide) append(precision->why, estimate.largest_part);
-  if (wide && estimate.reason.empty()) estimate.reason = "its region is too wide for its distance";
+  if (wide && estimate.reason.empty())
+    estimate.reason = "its region of uncertainty is too large for its distance";
   if (wide || estimate.verdict == Verdict::weak_geometry) append(estimate.reason, estimate.largest_part);
 }
 

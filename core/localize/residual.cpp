@@ -146,7 +146,8 @@ Eigen::Matrix4d noise_of(std::span<const Observation> observations, const Unknow
 }  // namespace
 
 Result<AnchorFit> finish_fit(RangeBlock& block, const Unknowns& at, const SolverOptions& options) {
-  if (!at.allFinite()) return make_error(Errc::no_convergence, "the solver left the finite numbers");
+  if (!at.allFinite())
+    return make_error(Errc::no_convergence, "the solver reached a value that is not finite");
   const double bend = options.loss_sigmas > 0 ? options.loss_sigmas : default_bend(options.loss);
   const auto free = free_unknowns(options);
   const auto size = static_cast<Eigen::Index>(free.size());

@@ -467,13 +467,13 @@ std::string why(const FlightRows& flight, std::span<const TrackBreak> breaks, co
         breaks.size(), worst.shift_m.norm(), mostly(worst.shift_m).c_str(),
         since(flight, breaks, worst.parts).c_str(), worst.chi2);
   else
-    std::snprintf(
-        text, sizeof text,
-        "the track is shifted by about %.2f m, %s, %s: the receiver fixed anew and wrongly, or its base got "
-        "another position (chi2 %.1f over the ranges of all anchors); exclude the positions before or after "
-        "it, whichever had the wrong fix or base, or fly again",
-        worst.shift_m.norm(), mostly(worst.shift_m).c_str(), since(flight, breaks, worst.parts).c_str(),
-        worst.chi2);
+    std::snprintf(text, sizeof text,
+                  "the track is shifted by about %.2f m, %s, %s: the receiver fixed with wrong ambiguities, "
+                  "or its base position changed (chi2 %.1f over the ranges of all anchors); exclude the "
+                  "positions before or after "
+                  "it, whichever had the wrong fix or base, or fly again",
+                  worst.shift_m.norm(), mostly(worst.shift_m).c_str(),
+                  since(flight, breaks, worst.parts).c_str(), worst.chi2);
   return text;
 }
 

@@ -101,12 +101,12 @@ Result<Bearing> bearing_from_turn(std::span<const TurnSample> samples) {
   if (gap > std::numbers::pi / 2) {
     return make_error(
         Errc::weak_geometry,
-        "the turn leaves " + std::to_string(static_cast<int>(gap / k_degree)) + " degrees unseen");
+        "the turn leaves " + std::to_string(static_cast<int>(gap / k_degree)) + " degrees without a sample");
   }
   double power = 0;
   for (const auto& s : samples) power += (s.rss_dbm - mean_dbm) * (s.rss_dbm - mean_dbm);
   if (std::sqrt(power / static_cast<double>(samples.size())) < 0.1) {
-    return make_error(Errc::weak_geometry, "RSS is the same all round: no lobe to find");
+    return make_error(Errc::weak_geometry, "RSS is the same in all directions: there is no lobe to find");
   }
 
   const Match match(samples, mean_dbm, power);

@@ -41,8 +41,8 @@ std::string outside(const FlightRows& rows) {
   }
   const auto poses = rows.track.poses();
   std::string why =
-      text("the ranges are from %.1f to %.1f s, the track from %.1f to %.1f s: both need one clock", first_s,
-           last_s, poses.front().t_s, poses.back().t_s);
+      text("the ranges are from %.1f to %.1f s, the track from %.1f to %.1f s: both must use one clock",
+           first_s, last_s, poses.front().t_s, poses.back().t_s);
   const double ratio = (last_s - first_s) / std::max(rows.track_span_s, 1e-3);
   if (ratio > 100 || ratio < 0.01) why += ", and t_s is in seconds";
   return why;
@@ -97,7 +97,7 @@ Unplaced unplaced_of(const FlightRows& rows, const FlightData& flight, const Fli
   } else if (reason == "unknown_tag") {
     out.why += "the tag and antenna of a range must be declared under tags";
   } else {
-    out.why += "see the counts of refused ranges";
+    out.why += "see the counts of rejected ranges";
   }
   return out;
 }

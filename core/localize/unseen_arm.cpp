@@ -87,22 +87,23 @@ Reach worst_of(const std::vector<Eigen::Vector3d>& moves, const Eigen::Matrix3d&
 std::string why(const Reach& worst, double unapplied) {
   char text[320];
   if (unapplied > 0)
-    std::snprintf(text, sizeof text,
-                  "the track has no heading, so %.2f m of the lever arm across are not applied: record the "
-                  "attitude, or mount the tag below the antenna",
-                  unapplied);
-  else if (worst.regions <= 1.0)
     std::snprintf(
         text, sizeof text,
-        "a lever arm that is wrong by up to %.1f m shows, or moves it by %.2f m at most, within its "
-        "region",
-        k_arm_asked_m, worst.moved_m);
-  else
+        "the track has no heading, so %.2f m of the horizontal lever arm are not applied: record the "
+        "attitude, or mount the tag below the antenna",
+        unapplied);
+  else if (worst.regions <= 1.0)
     std::snprintf(text, sizeof text,
-                  "a lever arm that is wrong by up to %.1f m may move it by %.2f m, out of its region, and "
-                  "show in no range: fly 20 s or more with the heading a quarter turn away, or declare how "
-                  "well the arm was measured (lever_arm_sigma_m)",
+                  "a lever arm that is wrong by up to %.1f m shows in the ranges, or moves it by at most "
+                  "%.2f m, within its region",
                   k_arm_asked_m, worst.moved_m);
+  else
+    std::snprintf(
+        text, sizeof text,
+        "a lever arm that is wrong by up to %.1f m may move it by %.2f m, out of its region, without showing "
+        "in any range: fly 20 s or more with the heading a quarter turn away, or declare how "
+        "well the arm was measured (lever_arm_sigma_m)",
+        k_arm_asked_m, worst.moved_m);
   return text;
 }
 

@@ -41,7 +41,7 @@ Result<std::vector<Importance>> permutation_importance(const Dataset& all, const
   std::vector<double> y(data.los.begin(), data.los.end());
   if (!classification) y = data.bias_m;
   if (y.size() != data.rows() || y.empty())
-    return make_error(Errc::invalid_argument, "the data have no answers to learn");
+    return make_error(Errc::invalid_argument, "the data have no labels or true ranges to learn from");
   const TrainingRows rows{data.x, data.columns(), y, data.weight};
   std::vector<BaggedTree> trees(static_cast<std::size_t>(std::max(recipe.forest.trees, 0)));
   BOOST_OUTCOME_TRY(parallel_for(trees.size(), run, [&](std::size_t t) -> Result<void> {

@@ -41,12 +41,12 @@ Result<Predictor::Slot> Predictor::slot_of(const Model* model, Task first, Task 
                                                model->info.feature_set + ", this build computes " +
                                                std::string{nlos::k_feature_set_version} + ": train it again");
   if (model->info.features.size() > k_max_features)
-    return make_error(Errc::invalid_argument, "the model asks for more than 64 features");
+    return make_error(Errc::invalid_argument, "the model needs more than 64 features");
   for (const auto& name : model->info.features) {
     const auto feature = nlos::feature_of(name);
     if (!feature)
-      return make_error(Errc::not_found, "the model asks for " + name +
-                                             ", a column of its table that live ranges do not have");
+      return make_error(Errc::not_found,
+                        "the model needs " + name + ", a column of its table that live ranges do not have");
     slot.columns.push_back(*feature);
   }
   return slot;

@@ -247,8 +247,8 @@ Result<void> TrainingSpec::check_size(std::size_t rows) const {
   if (row_fits <= k_most_row_fits) return boost::outcome_v2::success();
   std::array<char, 200> text{};
   std::snprintf(text.data(), text.size(),
-                "%.0f settings x %zu folds on %zu rows are %.2g row fits, more than the %.0e that end within "
-                "hours: take a smaller grid, fewer folds, or a data set of fewer rows",
+                "%.0f settings x %zu folds on %zu rows are %.2g row fits, more than the %.0e that finish "
+                "within hours: use a smaller grid, fewer folds, or a data set of fewer rows",
                 settings, folds, rows, row_fits, k_most_row_fits);
   return make_error(Errc::invalid_argument, text.data());
 }

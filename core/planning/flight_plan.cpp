@@ -131,7 +131,7 @@ std::vector<std::size_t> choose(Design& design, const Sights& all, const FlightP
       design.remove(all[next]);
       std::array<char, 128> text{};
       std::snprintf(text.data(), text.size(),
-                    "one more point would lower the predicted squared error by %.1f %% only", 100 * gain);
+                    "one more point would lower the predicted squared error by only %.1f %%", 100 * gain);
       reason = text.data();
       break;
     }
@@ -252,7 +252,7 @@ Result<void> FlightPlanOptions::check() const {
   const auto bad = [](const char* text) { return make_error(Errc::invalid_argument, text); };
   if (!(keep_out_m > 0 && keep_out_m <= 100)) return bad("keep_out_m must be above 0 and at most 100");
   if (rule == Rule::dissertation)
-    return bad("rule dissertation is of single points: of a whole flight a_optimal or d_optimal");
+    return bad("rule dissertation chooses single points only: for a whole flight use a_optimal or d_optimal");
   if (ring_m.empty()) return bad("ring_m must name at least one ring");
   for (const double m : ring_m) {
     if (!(m >= 0 && m <= 200)) return bad("ring_m must be 0 to 200");
@@ -325,7 +325,7 @@ Result<FlightPlan> plan_flight(const FlightPlanInput& input, const FlightPlanOpt
     for (const auto& c : chosen) design.remove(c.point_m);
     for (const auto& c : kept) design.add(c.point_m);
     plan.reason += "; " + std::to_string(chosen.size() - kept.size()) +
-                   " points that no legal way reaches were left out";
+                   " points that no permitted path reaches were left out";
     plan.waypoints.clear();
     plan.length_m = 0;
     BOOST_OUTCOME_TRY(order(plan, std::move(kept), input, options, bounds));

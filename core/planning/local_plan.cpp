@@ -109,11 +109,11 @@ std::string point_text(Refusal refusal, const Plan& plan, std::size_t i) {
   const auto& s = plan.settings;
   const std::string who = "waypoint " + std::to_string(i + 1) + " ";
   if (refusal == Refusal::too_low) {
-    return who + with_numbers("is %.1f m high, the band begins at %.1f m", plan.waypoints[i].height_m,
+    return who + with_numbers("is %.1f m high, the height band begins at %.1f m", plan.waypoints[i].height_m,
                               s.min_height_m);
   }
   if (refusal == Refusal::too_high) {
-    return who + with_numbers("is %.1f m high, the band ends at %.1f m", plan.waypoints[i].height_m,
+    return who + with_numbers("is %.1f m high, the height band ends at %.1f m", plan.waypoints[i].height_m,
                               s.max_height_m);
   }
   if (refusal == Refusal::outside_fence) return who + "lies outside the fence";
@@ -195,14 +195,15 @@ Result<PlanCheck> check_plan(const Plan& plan) {
   const auto report = [&](Severity severity, std::string code, std::string pointer, std::string text) {
     check.issues.push_back({severity, std::move(code), std::move(pointer), std::move(text)});
   };
-  if (plan.waypoints.empty()) report(Severity::error, "no_waypoints", "/waypoints", "there is no waypoint");
+  if (plan.waypoints.empty())
+    report(Severity::error, "no_waypoints", "/waypoints", "the plan has no waypoint");
   if (local.fence.empty()) {
     report(Severity::warning, "no_fence", "/fence",
            "no fence is drawn: only the height band and the no-fly areas bound the flight");
   }
   if (local.outline.empty()) {
     report(Severity::warning, "no_outline", "/outline",
-           "no outline is drawn: nothing keeps the aircraft off the building");
+           "no outline is drawn: nothing keeps the aircraft away from the building");
   }
   for (std::size_t i = 0; i < local.waypoints_m.size(); ++i) {
     const std::string pointer = "/waypoints/" + std::to_string(i);
@@ -216,7 +217,7 @@ Result<PlanCheck> check_plan(const Plan& plan) {
     check.length_m += (point - before).norm();
     if (!refuse_point(bounds, before) && !refuse_point(bounds, point) && refuse_path(bounds, before, point)) {
       report(Severity::error, "path_blocked", pointer,
-             "the straight way from waypoint " + std::to_string(i) + " to " + std::to_string(i + 1) +
+             "the straight line from waypoint " + std::to_string(i) + " to " + std::to_string(i + 1) +
                  " crosses the building, a no-fly area or the fence");
     }
   }
@@ -226,12 +227,12 @@ Result<PlanCheck> check_plan(const Plan& plan) {
            with_numbers("the flight takes at least %.0f s, the limit is %.0f s", check.time.low_s, *limit));
   } else if (limit && check.time.expected_s > *limit) {
     report(Severity::warning, "time_short", "/settings/max_flight_s",
-           with_numbers("the flight is expected to take %.0f s; at %.0f s, the limit, it returns unfinished",
+           with_numbers("the flight is expected to take %.0f s; at the limit of %.0f s it returns unfinished",
                         check.time.expected_s, *limit));
   }
   if (check.n_measure > 0 && check.n_measure < 4) {
     report(Severity::warning, "few_points", "/waypoints",
-           with_numbers("%.0f measuring points: four that are not in one plane are the least for a position",
+           with_numbers("%.0f measuring points: a position needs at least four that are not in one plane",
                         static_cast<double>(check.n_measure)));
   }
   predict(plan, local, check);

@@ -216,7 +216,7 @@ std::string refused_words(const Refusals& refused) {
 
 std::string words(const Decision& decision, const NextPointOptions& options, bool ridge) {
   const std::string total = "; " + std::to_string(decision.candidates.size()) + " candidates, ";
-  if (!decision.chosen) return "nowhere to go" + total + refused_words(decision.candidates.refused);
+  if (!decision.chosen) return "no point left to fly to" + total + refused_words(decision.candidates.refused);
   const CandidateValue best = decision.candidates[*decision.chosen];
   std::array<char, 256> text{};
   if (ridge) {

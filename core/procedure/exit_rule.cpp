@@ -8,10 +8,10 @@ namespace {
 std::optional<std::string> goal(const ExitRule& rule, const Progress& now) {
   if (now.iterations < rule.min_iterations) return std::nullopt;
   if (rule.target_sigma_m && now.sigma_m && *now.sigma_m <= *rule.target_sigma_m) {
-    return sentence("accuracy reached: %.3f m, wanted %.3f m", *now.sigma_m, *rule.target_sigma_m);
+    return sentence("accuracy reached: %.3f m, target %.3f m", *now.sigma_m, *rule.target_sigma_m);
   }
   if (rule.gdop_root && now.gdop_root && *now.gdop_root <= *rule.gdop_root) {
-    return sentence("GDOP (root) reached: %.3f, wanted %.3f", *now.gdop_root, *rule.gdop_root);
+    return sentence("GDOP (root) reached: %.3f, target %.3f", *now.gdop_root, *rule.gdop_root);
   }
   return std::nullopt;
 }
@@ -26,10 +26,10 @@ std::optional<Exit> exit_of(const ExitRule& rule, const Progress& now) {
   }
   if (reached) return Exit{true, *reached};
   if (rule.max_s && now.elapsed_s >= *rule.max_s) {
-    return Exit{false, sentence("time over: %.0f s of %.0f s", now.elapsed_s, *rule.max_s)};
+    return Exit{false, sentence("flight time used up: %.0f s of %.0f s", now.elapsed_s, *rule.max_s)};
   }
   if (now.iterations >= rule.max_iterations) {
-    return Exit{false, sentence("%.0f of %.0f points measured without reaching the goal", now.iterations,
+    return Exit{false, sentence("%.0f of %.0f points measured without reaching the target", now.iterations,
                                 rule.max_iterations)};
   }
   return std::nullopt;

@@ -204,7 +204,7 @@ void FlightControl::dispatch() {
   for (const auto& order : engine_.take_commands()) {
     Dispatch out{order.kind, 0, ""};
     if (taken_over_)
-      out.not_sent = "not sent: the pilot or a failsafe has the aircraft";
+      out.not_sent = "not sent: the pilot or a failsafe has taken over";
     else if (adopts_)
       out.not_sent = "not sent: no heartbeat of the aircraft since the restart";
     else if (drone_ != nullptr)
@@ -229,7 +229,7 @@ std::string FlightControl::command(double now_s, Trigger trigger, const std::str
   const bool meant = engine_.command(now_s, trigger, who);
   dispatch();
   const bool always = trigger == Trigger::hold || trigger == Trigger::land;
-  if (!meant && !always) return "nothing to do in step " + std::string(to_string(engine_.state().step));
+  if (!meant && !always) return "has no effect in step " + std::string(to_string(engine_.state().step));
   if (always && drone_ != nullptr && dispatched_.size() == before) {
     const bool holds = trigger == Trigger::hold;
     dispatched_.push_back(

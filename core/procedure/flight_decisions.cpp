@@ -28,7 +28,7 @@ std::string FlightEngine::outcome(const std::string& which) const {
   }
   if (n == 0) return "every " + which + " anchor is done";
   return "every " + which + " anchor is done or given up; " + std::to_string(n) +
-         " without the accuracy that was wanted: " + without;
+         " without reaching the target accuracy: " + without;
 }
 
 void FlightEngine::assess_anchors(double now_s, std::span<const Estimate> estimates) {
@@ -140,8 +140,9 @@ void FlightEngine::conclude(double now_s, Result<planning::Decision> decided) {
                       : std::isfinite(before)                          ? (before - best.value) / before
                                                                        : 1;
   if (gain < setup_.min_gain) {
-    return finish(now_s, Trigger::done_here,
-                  "the best point would bring " + std::to_string(std::lround(100 * gain)) + " %");
+    return finish(
+        now_s, Trigger::done_here,
+        "the best point would improve the result by only " + std::to_string(std::lround(100 * gain)) + " %");
   }
   const Eigen::Vector2d look = (setup_.middle_m - best.point_m).head<2>();
   decision_->outcome = "point: " + decision_->decision.reason;

@@ -149,7 +149,7 @@ void FlightEngine::taken_over(double now_s, const std::string& mode) {
   legs_.clear();
   pending_.reset();
   feed(now_s, Trigger::taken_over, mode);
-  report(now_s, EventLevel::warning, "drone.taken_over", "the pilot or a failsafe has the aircraft: " + mode);
+  report(now_s, EventLevel::warning, "drone.taken_over", "the pilot or a failsafe has taken over: " + mode);
 }
 
 /// What is wrong is judged anew: it was only told of before.
@@ -295,9 +295,9 @@ void FlightEngine::fly(double now_s, const Eigen::Vector3d& to_m, std::optional<
       from && !(home && lost) ? planning::route(setup_.limits.bounds, *from, to_m) : std::nullopt;
   if (!way && home) return order({Command::Kind::return_home, {0, 0, 0}, std::nullopt});
   if (!way) {
-    report(now_s, EventLevel::warning, "point.unreachable", "no legal way to the target");
+    report(now_s, EventLevel::warning, "point.unreachable", "no permitted path to the target");
     pending_ = Trigger::unreachable;
-    pending_text_ = "no legal way";
+    pending_text_ = "no permitted path";
     return;
   }
   legs_.assign(way->begin(), way->end());
@@ -437,13 +437,13 @@ void FlightEngine::work(double now_s, std::span<const Estimate> estimates, bool 
     case Step::search_anchors: {
       const auto& waypoint = setup_.settings.waypoints.at(state_.waypoint);
       if (state_.steps == 0 && !waypoint.measure) {
-        feed(now_s, Trigger::done_here, "a point on the way only");
+        feed(now_s, Trigger::done_here, "a waypoint without measurement");
       } else if (here_s >= k_listen_s && heard(k_in_range)) {
         feed(now_s, Trigger::in_range);
       } else if (here_s >= 2 * k_listen_s &&
                  std::any_of(state_.anchors.begin(), state_.anchors.end(),
                              [](const AnchorTask& a) { return a.samples_here >= k_in_range; })) {
-        feed(now_s, Trigger::done_here, "only anchors that are done answer here");
+        feed(now_s, Trigger::done_here, "only anchors that are done are in range here");
       }
       return;
     }

@@ -258,7 +258,7 @@ Result<void> Settings::check() const {
   if (!(min_height_m < max_height_m)) return bad("min_height_m must be below max_height_m");
   for (const double s : {go_to_s, search_s, turn_leg_s, height_leg_s, ranging_s, decide_s, connections_s,
                          hold_s, take_off_s, landing_s, return_s}) {
-    if (!(s > 0)) return bad("every step needs a longest stay above 0 s");
+    if (!(s > 0)) return bad("every step needs a time limit above 0 s");
   }
   return boost::outcome_v2::success();
 }

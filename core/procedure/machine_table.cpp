@@ -14,8 +14,8 @@ constexpr Transition k_table[] = {
     {S::ready, E::start, G::always, S::take_off, "started by the operator"},
 
     {S::take_off, E::airborne, G::always, S::go_to_waypoint, "in the air, to the first waypoint"},
-    {S::take_off, E::not_taken_off, G::always, S::done, "not taken off"},
-    {S::take_off, E::timeout, G::tries_left, S::take_off, "take-off not confirmed, once more"},
+    {S::take_off, E::not_taken_off, G::always, S::done, "did not take off"},
+    {S::take_off, E::timeout, G::tries_left, S::take_off, "take-off not confirmed, commanded again"},
     {S::take_off, E::timeout, G::always, S::landing, "take-off not confirmed, giving up"},
 
     {S::go_to_waypoint, E::arrived, G::always, S::search_anchors, "waypoint reached, listening"},
@@ -27,9 +27,9 @@ constexpr Transition k_table[] = {
      "waypoint not allowed, to the next"},
     {S::go_to_waypoint, E::unreachable, G::always, S::return_home, "last waypoint not allowed"},
 
-    {S::search_anchors, E::in_range, G::wants_turn, S::turn, "anchor in range, its bearing is wanted"},
+    {S::search_anchors, E::in_range, G::wants_turn, S::turn, "anchor in range, its bearing is needed"},
     {S::search_anchors, E::in_range, G::wants_height, S::height_search,
-     "anchor in range, its height is wanted"},
+     "anchor in range, its height is needed"},
     {S::search_anchors, E::in_range, G::always, S::ranging, "anchors in range, ranging"},
     {S::search_anchors, E::done_here, G::waypoint_left, S::go_to_waypoint,
      "nothing to measure here, to the next waypoint"},
@@ -41,13 +41,13 @@ constexpr Transition k_table[] = {
 
     {S::move_around, E::arrived, G::always, S::search_anchors, "moved, listening again"},
     {S::move_around, E::unreachable, G::always, S::search_anchors,
-     "that direction is closed, listening again"},
+     "that direction is blocked, listening again"},
     {S::move_around, E::timeout, G::always, S::search_anchors, "move not finished, listening again"},
 
     {S::step_to_waypoint, E::arrived, G::always, S::search_anchors, "a step further, listening again"},
     {S::step_to_waypoint, E::unreachable, G::waypoint_left, S::go_to_waypoint,
-     "the step is closed, to the next waypoint"},
-    {S::step_to_waypoint, E::unreachable, G::always, S::return_home, "the step is closed, no waypoint left"},
+     "the step is blocked, to the next waypoint"},
+    {S::step_to_waypoint, E::unreachable, G::always, S::return_home, "the step is blocked, no waypoint left"},
     {S::step_to_waypoint, E::timeout, G::waypoint_left, S::go_to_waypoint,
      "the step took too long, to the next waypoint"},
     {S::step_to_waypoint, E::timeout, G::always, S::return_home, "the step took too long, no waypoint left"},
@@ -60,17 +60,18 @@ constexpr Transition k_table[] = {
 
     {S::height_search, E::arrived, G::legs_left, S::height_search, "a leg of the height search done"},
     {S::height_search, E::arrived, G::always, S::ranging, "heights searched, ranging"},
-    {S::height_search, E::unreachable, G::legs_left, S::height_search, "that height is closed, the next"},
-    {S::height_search, E::unreachable, G::always, S::ranging, "that height is closed, ranging"},
+    {S::height_search, E::unreachable, G::legs_left, S::height_search,
+     "that height is blocked, to the next height"},
+    {S::height_search, E::unreachable, G::always, S::ranging, "that height is blocked, ranging"},
     {S::height_search, E::timeout, G::always, S::ranging, "height search not finished, ranging"},
 
     {S::ranging, E::sampled, G::always, S::find_next_point, "enough ranges at this point"},
     {S::ranging, E::timeout, G::anything_sampled, S::find_next_point, "time at this point is over"},
-    {S::ranging, E::timeout, G::always, S::search_anchors, "every anchor went silent, listening again"},
+    {S::ranging, E::timeout, G::always, S::search_anchors, "no anchor answers any more, listening again"},
 
     {S::find_next_point, E::point, G::always, S::go_to_point, "better point found"},
     {S::find_next_point, E::done_here, G::waypoint_left, S::go_to_waypoint,
-     "enough here, to the next waypoint"},
+     "enough measured here, to the next waypoint"},
     {S::find_next_point, E::done_here, G::always, S::return_home,
      "nothing more to gain at the last waypoint"},
     {S::find_next_point, E::no_point, G::waypoint_left, S::go_to_waypoint,
@@ -81,17 +82,17 @@ constexpr Transition k_table[] = {
     {S::find_next_point, E::timeout, G::always, S::return_home, "no decision in time and no waypoint left"},
 
     {S::go_to_point, E::arrived, G::always, S::check_connections, "point reached"},
-    {S::go_to_point, E::unreachable, G::always, S::go_back, "point not reachable, remembered"},
-    {S::go_to_point, E::timeout, G::always, S::go_back, "point not reached in time, remembered"},
+    {S::go_to_point, E::unreachable, G::always, S::go_back, "point not reachable, noted"},
+    {S::go_to_point, E::timeout, G::always, S::go_back, "point not reached in time, noted"},
 
-    {S::check_connections, E::connected, G::wants_turn, S::turn, "new anchor here, its bearing is wanted"},
-    {S::check_connections, E::connected, G::always, S::ranging, "all connections stand, ranging"},
-    {S::check_connections, E::disconnected, G::always, S::go_back, "no connection at this point, remembered"},
-    {S::check_connections, E::timeout, G::always, S::go_back,
-     "no connection at this point in time, remembered"},
+    {S::check_connections, E::connected, G::wants_turn, S::turn, "new anchor here, its bearing is needed"},
+    {S::check_connections, E::connected, G::always, S::ranging, "all anchors connected, ranging"},
+    {S::check_connections, E::disconnected, G::always, S::go_back, "no connection at this point, noted"},
+    {S::check_connections, E::timeout, G::always, S::go_back, "no connection at this point in time, noted"},
 
-    {S::go_back, E::arrived, G::always, S::find_next_point, "back at the former point"},
-    {S::go_back, E::unreachable, G::always, S::find_next_point, "the way back is closed, deciding from here"},
+    {S::go_back, E::arrived, G::always, S::find_next_point, "back at the previous point"},
+    {S::go_back, E::unreachable, G::always, S::find_next_point,
+     "the way back is blocked, deciding from here"},
     {S::go_back, E::timeout, G::always, S::find_next_point, "not back in time, deciding from here"},
 
     {S::hold, E::resume, G::was_returning, S::return_home, "resumed, on the way home"},
@@ -122,12 +123,11 @@ std::span<const Transition> transitions() {
         out.push_back({from, E::return_home, G::always, S::return_home, "commanded to return"});
       out.push_back({from, E::land, G::always, S::landing, "commanded to land"});
       if (from != S::hold)
-        out.push_back({from, E::taken_over, G::always, S::hold, "the pilot or a failsafe has the aircraft"});
+        out.push_back({from, E::taken_over, G::always, S::hold, "the pilot or a failsafe has taken over"});
       if (from != S::return_home)
         out.push_back({from, E::landed, G::always, S::done, "landed and disarmed without a command"});
     }
-    out.push_back(
-        {S::landing, E::taken_over, G::always, S::hold, "the pilot or a failsafe has the aircraft"});
+    out.push_back({S::landing, E::taken_over, G::always, S::hold, "the pilot or a failsafe has taken over"});
     out.push_back({S::landing, E::hold, G::always, S::hold, "landing stopped, commanded to hold"});
     return out;
   }();

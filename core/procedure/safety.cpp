@@ -24,17 +24,19 @@ std::string explain(const planning::Bounds& bounds, planning::Refusal refusal, c
         if (area.size() >= 3)
           nearest_m = std::min(nearest_m, planning::distance_to_edge_m(area, at_m.head<2>()));
       }
-      return sentence("%.1f m from the building or a no-fly area, %.1f m are kept", nearest_m,
+      return sentence("%.1f m from the building or a no-fly area, %.1f m required", nearest_m,
                       bounds.keep_out_m);
     }
     case Refusal::near_wall:
-      return "too near to a wall";
+      return "too close to a wall";
     case Refusal::too_low:
-      return sentence("%.1f m high, the band begins at %.1f m", at_m.z(), bounds.min_height_m.value_or(0));
+      return sentence("%.1f m high, the height band begins at %.1f m", at_m.z(),
+                      bounds.min_height_m.value_or(0));
     case Refusal::too_high:
-      return sentence("%.1f m high, the band ends at %.1f m", at_m.z(), bounds.max_height_m.value_or(0));
+      return sentence("%.1f m high, the height band ends at %.1f m", at_m.z(),
+                      bounds.max_height_m.value_or(0));
     case Refusal::path_blocked:
-      return "the straight way crosses the building, a no-fly area or the fence";
+      return "the straight line crosses the building, a no-fly area or the fence";
     case Refusal::visited:
     case Refusal::unreachable:
     case Refusal::over_range:
@@ -63,9 +65,9 @@ std::optional<Alarm> breach(const SafetyLimits& limits, const Eigen::Vector3d& a
     return Alarm{Reaction::hold, false, "fence.breach", sentence("%.1f m outside the fence", out_m)};
   }
   if (*refusal == planning::Refusal::too_high) {
-    return Alarm{
-        Reaction::hold, false, "fence.breach",
-        sentence("%.1f m high, the band ends at %.1f m", at_m.z(), limits.bounds.max_height_m.value_or(0))};
+    return Alarm{Reaction::hold, false, "fence.breach",
+                 sentence("%.1f m high, the height band ends at %.1f m", at_m.z(),
+                          limits.bounds.max_height_m.value_or(0))};
   }
   return Alarm{Reaction::hold, false, "fence.breach",
                sentence("nearer than %.1f m to the building or a no-fly area", limits.bounds.keep_out_m)};
@@ -77,7 +79,7 @@ std::optional<std::string> refuse_standing(const SafetyLimits& limits, const Eig
                                            std::string_view what) {
   const auto floor_m = limits.bounds.min_height_m;
   if (floor_m && at_m.z() < *floor_m - limits.floor_tolerance_m)
-    return std::string(what) + sentence(" %.1f m high, the band begins at %.1f m", at_m.z(), *floor_m);
+    return std::string(what) + sentence(" %.1f m high, the height band begins at %.1f m", at_m.z(), *floor_m);
   if (!breach(limits, at_m)) return std::nullopt;
   const auto refusal = planning::refuse_point(widened(limits), at_m);
   return std::string(what) + ' ' + explain(limits.bounds, *refusal, at_m);
@@ -85,7 +87,7 @@ std::optional<std::string> refuse_standing(const SafetyLimits& limits, const Eig
 
 std::optional<Refused> refuse_take_off(const planning::Bounds& bounds, const Eigen::Vector3d& stands_m,
                                        double height_m) {
-  // Straight up from where it stands, which must be inside the fence and off every area.
+  // Straight up from where it stands, which must be inside the fence and outside every no-fly area.
   Eigen::Vector3d above = stands_m;
   above.z() = std::max(height_m, bounds.min_height_m.value_or(height_m));
   const auto refusal = planning::refuse_point(bounds, above);
@@ -107,10 +109,10 @@ std::optional<Refused> refuse_command(const SafetyLimits& limits,
   }
   if (command.kind != Command::Kind::go_to) return std::nullopt;
   if (!command.point_m.allFinite() || (command.heading_rad && !std::isfinite(*command.heading_rad))) {
-    return Refused{"not_finite", "the target is not a number"};
+    return Refused{"not_finite", "the position of the target is not a number"};
   }
   if (!aircraft_m || !aircraft_m->allFinite())
-    return Refused{"position_unknown", "it is not known where the aircraft is"};
+    return Refused{"position_unknown", "the aircraft's position is not known"};
   const double jump_m = (command.point_m - *aircraft_m).norm();
   if (jump_m > limits.max_jump_m) {
     return Refused{
@@ -122,7 +124,7 @@ std::optional<Refused> refuse_command(const SafetyLimits& limits,
   }
   if (const auto refusal = planning::refuse_path(bounds, *aircraft_m, command.point_m)) {
     return Refused{std::string(planning::to_string(*refusal)),
-                   "the straight way to the target is not allowed"};
+                   "the straight line to the target is not allowed"};
   }
   return std::nullopt;
 }
@@ -144,14 +146,15 @@ std::optional<Alarm> watch(const SafetyLimits& limits, const Situation& now) {
   }
   if (now.cell_v && *now.cell_v <= limits.critical_cell_v) {
     return Alarm{Reaction::land, false, "drone.battery",
-                 sentence("battery at %.2f V a cell: landing here", *now.cell_v)};
+                 sentence("battery at %.2f V per cell: landing here", *now.cell_v)};
   }
   if (now.battery_warning == 1) {
     return Alarm{Reaction::return_home, false, "drone.battery", "the autopilot reports a low battery"};
   }
   if (now.cell_v && *now.cell_v <= limits.low_cell_v) {
-    return Alarm{Reaction::return_home, false, "drone.battery",
-                 sentence("battery at %.2f V a cell, %.2f V are needed", *now.cell_v, limits.low_cell_v)};
+    return Alarm{
+        Reaction::return_home, false, "drone.battery",
+        sentence("battery at %.2f V per cell, at least %.2f V are needed", *now.cell_v, limits.low_cell_v)};
   }
   if (now.battery && now.position_m && *now.battery <= return_margin(limits, *now.position_m)) {
     return Alarm{Reaction::return_home, false, "drone.battery",
@@ -163,7 +166,7 @@ std::optional<Alarm> watch(const SafetyLimits& limits, const Situation& now) {
     if (now.floor && floor_m && now.position_m->z() < *floor_m - limits.floor_tolerance_m) {
       return Alarm{
           Reaction::hold, true, "fence.breach",
-          sentence("%.1f m high, the band begins at %.1f m: climbing", now.position_m->z(), *floor_m)};
+          sentence("%.1f m high, the height band begins at %.1f m: climbing", now.position_m->z(), *floor_m)};
     }
     if (auto alarm = breach(limits, *now.position_m)) return alarm;
   }

@@ -32,14 +32,15 @@ std::string why_not_done(const std::optional<Estimate>& estimate, std::span<cons
   }
   const auto& at = estimate->best->position.m;
   if (estimate->mirror) {
-    return sentence("mirror: a solution %.1f m away fits as well; another height or side decides",
-                    (estimate->mirror->position.m - at).norm());
+    return sentence(
+        "mirror: a solution %.1f m away fits as well; measure at another height or from another side",
+        (estimate->mirror->position.m - at).norm());
   }
   if (!points.empty()) {
     const auto [low, high] = std::minmax_element(points.begin(), points.end(),
                                                  [](const auto& a, const auto& b) { return a.z() < b.z(); });
     if (high->z() - low->z() < k_flat_m) {
-      return sentence("flat flight: all points within %.1f m of height, its height is not seen",
+      return sentence("flat flight: all points within %.1f m of height, its height cannot be determined",
                       high->z() - low->z());
     }
     const double gap = widest_gap_deg(points, at);
@@ -50,7 +51,7 @@ std::string why_not_done(const std::optional<Estimate>& estimate, std::span<cons
   for (const auto& [reason, count] : estimate->refused) refused += count;
   const auto all = static_cast<double>(refused + estimate->n_used);
   if (all > 0 && static_cast<double>(refused) / all > k_nlos_share) {
-    return sentence("too many ranges refused: %.0f of %.0f", static_cast<double>(refused), all);
+    return sentence("too many ranges rejected: %.0f of %.0f", static_cast<double>(refused), all);
   }
   if (estimate->bias_sigma_m && *estimate->bias_sigma_m > k_bias_m) {
     return sentence("bias and position cannot be distinguished: bias known to %.2f m",
@@ -58,12 +59,12 @@ std::string why_not_done(const std::optional<Estimate>& estimate, std::span<cons
   }
   const auto sigma = position_sigma_m(*estimate);
   if (sigma && rule.target_sigma_m && *sigma > *rule.target_sigma_m) {
-    return sentence("accuracy %.3f m, wanted %.3f m", *sigma, *rule.target_sigma_m);
+    return sentence("accuracy %.3f m, target %.3f m", *sigma, *rule.target_sigma_m);
   }
   if (estimate->verdict != Verdict::ok)
-    return estimate->reason.empty() ? "not assessed as ok yet" : estimate->reason;
+    return estimate->reason.empty() ? "verdict not ok yet" : estimate->reason;
   if (const Gate* gate = holding_back(*estimate)) return gate->why;
-  return "more points wanted";
+  return "more points needed";
 }
 
 }  // namespace anchord::procedure

@@ -53,10 +53,10 @@ class Rate {
 
 /// For a device whose bytes make no frame.
 std::string unreadable(const Settings& settings, const link::Address& address) {
-  std::string out = "bytes come, but they make no frame: is it a " + settings.kind + " device";
-  if (settings.kind == "gnss") out += ", of the format that is set (auto takes any)";
+  std::string out = "bytes are received, but they make no frame: is it a " + settings.kind + " device";
+  if (settings.kind == "gnss") out += " that sends the format that is set (auto accepts any)";
   if (address.kind == link::Kind::serial)
-    out += ", and is its rate " + std::to_string(address.baud) + " baud";
+    out += ", and is its baud rate " + std::to_string(address.baud) + " baud";
   return out + "?";
 }
 
@@ -107,12 +107,13 @@ class DeviceLoop::Impl final : public PipelineSink, public std::enable_shared_fr
   Result<void> add(const Settings& settings) {
     BOOST_OUTCOME_TRY(const auto address, link::parse_address(settings.address));
     for (const auto& [slot, entry] : entries_) {
-      if (entry.settings.id == settings.id) return make_error(Errc::conflict, "the device is there already");
+      if (entry.settings.id == settings.id)
+        return make_error(Errc::conflict, "a device with this id already exists");
       // One caster has many mount points, one broker many topics.
       const bool shared = settings.kind == "ntrip" || settings.kind == "mqtt";
       if (shared && settings.kind == entry.settings.kind) continue;
       if (entry.address == address && (address.kind == link::Kind::serial || address.port != 0)) {
-        return make_error(Errc::conflict, "address: " + settings.address + " is that of device \"" +
+        return make_error(Errc::conflict, "address: " + settings.address + " is used by device \"" +
                                               entry.settings.name + "\"");
       }
     }

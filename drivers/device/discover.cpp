@@ -43,13 +43,13 @@ void judge(Ear& ear) {
   }
   if (looks_like_pozyx(out.address)) {
     out.kind = "pozyx";
-    out.evidence = "by its USB name";
+    out.evidence = "identified by its USB name";
     return;
   }
   out.evidence = !ear.why.empty() ? ear.why
-                 : ear.bytes > 0
-                     ? std::to_string(ear.bytes) + " bytes that nothing here reads: another baud rate?"
-                     : "open, but silent";
+                 : ear.bytes > 0  ? std::to_string(ear.bytes) +
+                                       " bytes that no driver can read: is the baud rate another one?"
+                                 : "open, but nothing was received";
 }
 
 }  // namespace
@@ -87,7 +87,7 @@ std::vector<Candidate> discover(const std::vector<std::string>& ours, const Disc
   for (std::size_t i = 0; i < ears.size(); ++i) {
     auto& ear = *ears[i];
     if (ear.candidate.configured) {
-      ear.candidate.evidence = "is configured already";
+      ear.candidate.evidence = "is already configured";
     } else {
       judge(ear);
       if (i >= n_serial && ear.candidate.kind.empty()) continue;  // a service that is not there is no news

@@ -32,23 +32,25 @@ Result<std::unique_ptr<Driver>> make_rover(const Json& options, DriverOutput& ou
     if (key == "format") {
       if (value == "auto") continue;
       rover.format = gnss::k_protocol_words.find(text_of(value));
-      if (!rover.format) return bad(key, "one of auto, " + list_of(gnss::k_protocol_words.words()));
+      if (!rover.format) return bad(key, "must be one of auto, " + list_of(gnss::k_protocol_words.words()));
     } else if (key == "gst_order") {
       const auto order = gnss::nmea::k_gst_order_words.find(text_of(value));
-      if (!order) return bad(key, "one of " + list_of(gnss::nmea::k_gst_order_words.words()));
+      if (!order) return bad(key, "must be one of " + list_of(gnss::nmea::k_gst_order_words.words()));
       rover.gst_order = *order;
     } else if (key == "latency_ms") {
       if (!value.is_number() || value.get<double>() < 0 || value.get<double>() > 1000)
-        return bad(key, "0 to 1000");
+        return bad(key, "must be 0 to 1000");
       rover.latency_s = value.get<double>() * 1e-3;
     } else if (key == "gpsd_device") {
-      if (!value.is_string() || value.get_ref<const std::string&>().size() > 200) return bad(key, "a path");
+      if (!value.is_string() || value.get_ref<const std::string&>().size() > 200)
+        return bad(key, "must be a path");
       rover.gpsd_device = value.get<std::string>();
     } else if (key == "corrections") {
-      if (value != "own" && value != "ntrip") return bad(key, "own or ntrip");
+      if (value != "own" && value != "ntrip") return bad(key, "must be own or ntrip");
       rover.takes_corrections = value == "ntrip";
     } else {
-      return bad(key, "a gnss device has format, gst_order, latency_ms, gpsd_device, corrections");
+      return bad(key,
+                 "no such option: a gnss device has format, gst_order, latency_ms, gpsd_device, corrections");
     }
   }
   return std::unique_ptr<Driver>(std::make_unique<gnss::Rover>(std::move(rover), output));
@@ -66,25 +68,27 @@ Result<std::unique_ptr<Driver>> make_caster_client(const Json& options, std::str
   ntrip::ClientOptions client;
   for (const auto& [key, value] : options.items()) {
     if (key == "mount") {
-      if (!plain(value, 200) || value == "") return bad(key, "the name of a mount point");
+      if (!plain(value, 200) || value == "") return bad(key, "must be the name of a mount point");
       client.mount = value.get<std::string>();
     } else if (key == "user") {
-      if (!value.is_string() || value.get_ref<const std::string&>().size() > 200) return bad(key, "a name");
+      if (!value.is_string() || value.get_ref<const std::string&>().size() > 200)
+        return bad(key, "must be a name");
       client.user = value.get<std::string>();
     } else if (key == "password_file") {
-      if (!value.is_string() || value.get_ref<const std::string&>().size() > 1000) return bad(key, "a path");
+      if (!value.is_string() || value.get_ref<const std::string&>().size() > 1000)
+        return bad(key, "must be a path");
       client.password_file = value.get<std::string>();
     } else if (key == "version") {
-      if (value != 1 && value != 2) return bad(key, "1 or 2");
+      if (value != 1 && value != 2) return bad(key, "must be 1 or 2");
       client.version = value.get<int>();
     } else if (key == "send_gga") {
-      if (!value.is_boolean()) return bad(key, "true or false");
+      if (!value.is_boolean()) return bad(key, "must be true or false");
       client.send_gga = value.get<bool>();
     } else {
-      return bad(key, "an ntrip device has mount, user, password_file, version, send_gga");
+      return bad(key, "no such option: an ntrip device has mount, user, password_file, version, send_gga");
     }
   }
-  if (client.mount.empty()) return bad("mount", "the caster's mount point is needed");
+  if (client.mount.empty()) return bad("mount", "is missing: give the caster's mount point");
   if (const auto where = link::parse_address(address); where && where.value().kind == link::Kind::tcp)
     client.host = where.value().host + ":" + std::to_string(where.value().port);
   return std::unique_ptr<Driver>(std::make_unique<ntrip::Client>(std::move(client), output));

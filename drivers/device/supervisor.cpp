@@ -45,9 +45,9 @@ SupervisorStep advance(const Supervision& state, const Occurrence& occurrence,
       } else if (state.phase == Phase::open || state.phase == Phase::talking) {
         if (now - state.quiet_since_ns < options.silent_after_ns) break;
         enter(next, Phase::silent, now);
-        next.reason = "the link is open, but nothing comes";
+        next.reason = "the link is open, but nothing is received";
       } else if (state.phase == Phase::silent && now - state.quiet_since_ns >= options.reopen_after_ns) {
-        lose(next, occurrence, options, "silent for too long: opened again");
+        lose(next, occurrence, options, "nothing received for too long: opened again");
         step.wanted = Wanted::close;
       }
       break;

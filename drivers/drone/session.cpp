@@ -66,7 +66,7 @@ void Session::forget_vehicle() {
   telemetry_ = Telemetry();
   if (transfer_) {
     transfer_->check = false;
-    end_transfer(CommandState::unconfirmed, "the aircraft on the link is another one");
+    end_transfer(CommandState::unconfirmed, "another aircraft is on the link now");
   }
 }
 

@@ -47,7 +47,8 @@ void Session::command(std::uint64_t number, const std::string& what, int command
 bool Session::deaf(std::uint64_t number, const std::string& what) {
   if (last_seen_s_ && autopilot_ != Autopilot::unknown) return false;
   report(number, what, CommandState::refused,
-         last_seen_s_ ? "neither ArduPilot nor PX4" : "no heartbeat of the aircraft is received");
+         last_seen_s_ ? "the autopilot is neither ArduPilot nor PX4"
+                      : "no heartbeat is received from the aircraft");
   return true;
 }
 

@@ -105,7 +105,7 @@ void Session::drive_take_off() {
   const double patience_s = t.stage == Stage::climb ? options_.climb_s : options_.confirm_s + 0.2;
   if (now_s_ - t.stage_s > patience_s) {
     const auto said = said_since(t.stage_s);
-    const char* what = t.stage == Stage::mode  ? "it stays in its mode"
+    const char* what = t.stage == Stage::mode  ? "it does not change its mode"
                        : t.stage == Stage::arm ? "it does not arm"
                                                : "it does not climb";
     return end_take_off(CommandState::unconfirmed, what + (said.empty() ? "" : ": " + said));
@@ -164,14 +164,14 @@ std::uint64_t Session::go_to(double lat_deg, double lon_deg, double height_m,
   // The last gate, behind the guard of the procedure.
   if (!std::isfinite(lat_deg) || !std::isfinite(lon_deg) || !std::isfinite(height_m) ||
       std::abs(lat_deg) > 90 || std::abs(lon_deg) > 180 || (lat_deg == 0 && lon_deg == 0)) {
-    return refuse("the target is no place");
+    return refuse("the target is not a valid position");
   }
   if (!flight_) return refuse("nothing is being flown");
   if (flight_->taken_over)
     return refuse("the pilot or a failsafe has taken over: " +
                   std::string(mode_word(autopilot_, custom_mode_)));
   if (!telemetry_.fresh("GLOBAL_POSITION_INT", now_s_, 5))
-    return refuse("the autopilot has not reported its position");
+    return refuse("the autopilot does not report its position");
   if (!telemetry_.armed()) return refuse("the aircraft is disarmed");
   if (const double m = distance_m(lat_deg, lon_deg, height_m); m > options_.max_jump_m) {
     return refuse("the target is " + std::to_string(std::lround(m)) + " m away");

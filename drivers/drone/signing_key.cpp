@@ -38,7 +38,7 @@ Result<mavlink::Secret> parse_signing_key(std::string_view text) {
     const int high = digit(text[2 * i]), low = digit(text[2 * i + 1]);
     if (high < 0 || low < 0)
       return make_error(Errc::invalid_argument, "character " + std::to_string(2 * i + (high < 0 ? 1 : 2)) +
-                                                    " of the MAVLink signing key is no hexadecimal digit");
+                                                    " of the MAVLink signing key is not a hexadecimal digit");
     out[i] = static_cast<std::uint8_t>(high << 4 | low);
   }
   return out;

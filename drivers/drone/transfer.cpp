@@ -48,10 +48,10 @@ bool alike(const MissionItem& a, const MissionItem& b) {
 std::string difference(const std::vector<MissionItem>& wanted, const std::vector<MissionItem>& kept,
                        std::size_t first) {
   if (wanted.size() != kept.size())
-    return "the autopilot keeps " + std::to_string(kept.size()) + " of " + std::to_string(wanted.size()) +
+    return "the autopilot stored " + std::to_string(kept.size()) + " of " + std::to_string(wanted.size()) +
            " items";
   for (std::size_t i = first; i < wanted.size(); ++i) {
-    if (!alike(wanted[i], kept[i])) return "the autopilot keeps another item " + std::to_string(i);
+    if (!alike(wanted[i], kept[i])) return "the autopilot stored a different item " + std::to_string(i);
   }
   return {};
 }
@@ -94,7 +94,7 @@ std::uint64_t Session::upload(ItemList list, std::vector<MissionItem> items) {
   const std::uint64_t number = ++number_;
   if (transfer_ || items.size() > k_max_items) {
     report(number, "upload", CommandState::refused,
-           transfer_ ? "another transfer runs" : "more than 1000 items");
+           transfer_ ? "another transfer is running" : "more than 1000 items");
     return number;
   }
   report(number, "upload", CommandState::sent, list_word(list));
@@ -107,7 +107,7 @@ std::uint64_t Session::upload(ItemList list, std::vector<MissionItem> items) {
 std::uint64_t Session::download(ItemList list) {
   const std::uint64_t number = ++number_;
   if (transfer_) {
-    report(number, "download", CommandState::refused, "another transfer runs");
+    report(number, "download", CommandState::refused, "another transfer is running");
     return number;
   }
   report(number, "download", CommandState::sent, list_word(list));
@@ -186,7 +186,7 @@ void Session::on_transfer(const Message& m) {
     const auto type = m.integer("type");
     end_transfer(type == 0 ? CommandState::accepted : CommandState::refused,
                  type == 0   ? std::to_string(t.count) + " items"
-                 : type == 3 ? "the autopilot does not keep this list (unsupported)"
+                 : type == 3 ? "the autopilot does not support this list"
                              : "MISSION_ACK type " + std::to_string(type));
   } else if (!t.up && m.is("MISSION_COUNT") && t.count == 0) {
     answered();

@@ -166,7 +166,7 @@ void Tag::tick(const device::Arrival& now) {
       return;
     case State::waking:
       if (++tries_ > k_tries)
-        return out_.hang_up("no DWM1001 shell answers: is this its port, at 115200 baud?", 5 * k_s);
+        return out_.hang_up("no DWM1001 shell answers: is this the right port, at 115200 baud?", 5 * k_s);
       return out_.send("\r\r");
     case State::restarting:
       state_ = State::waking;
@@ -175,7 +175,8 @@ void Tag::tick(const device::Arrival& now) {
       return out_.send("\r\r");
     case State::asking:
       if (!id_ && options_.tag) identify(*options_.tag);
-      if (!id_) return out_.hang_up("its shell does not say the id (si): set the option tag", 60 * k_s);
+      if (!id_)
+        return out_.hang_up("its shell does not show the id (command si): set the option tag", 60 * k_s);
       return begin_les();
     case State::ranging:
       return;
@@ -188,7 +189,7 @@ void Tag::closed(const device::Arrival&) {
 }
 
 void Tag::command(const device::Command& command, const device::Arrival&) {
-  out_.answer(command.id, make_error(Errc::unsupported, "a DWM1001 takes no commands here"));
+  out_.answer(command.id, make_error(Errc::unsupported, "a DWM1001 does not support commands"));
 }
 
 Result<std::unique_ptr<device::Driver>> make_tag(std::string_view options_json,
@@ -203,17 +204,18 @@ Result<std::unique_ptr<device::Driver>> make_tag(std::string_view options_json,
     const std::string text = value.is_string() ? value.get<std::string>() : "";
     if (key == "mode") {
       const auto mode = k_mode_words.find(text);
-      if (!mode) return bad(key, "one of " + list_of(k_mode_words.words()));
+      if (!mode) return bad(key, "must be one of " + list_of(k_mode_words.words()));
       out.mode = *mode;
     } else if (key == "tag") {
       const auto id = parse_network_id(text);
-      if (!id) return bad(key, "an id like 0x022e");
+      if (!id) return bad(key, "must be an id like 0x022e");
       out.tag = id.value();
     } else {
-      return bad(key, "a dwm1001 device has mode, tag");
+      return bad(key, "no such option: a dwm1001 device has mode, tag");
     }
   }
-  if (out.mode == Mode::tlv && !out.tag) return bad("tag", "is needed in binary: an id like 0x022e");
+  if (out.mode == Mode::tlv && !out.tag)
+    return bad("tag", "is needed in binary mode: give an id like 0x022e");
   return std::unique_ptr<device::Driver>(std::make_unique<Tag>(out, output));
 }
 

@@ -134,7 +134,8 @@ void Rover::closed(const Arrival& now) {
 }
 
 void Rover::command(const device::Command& command, const Arrival&) {
-  out_.answer(command.id, make_error(Errc::unsupported, "a rover takes no \"" + command.name + "\""));
+  out_.answer(command.id, make_error(Errc::unsupported, "a GNSS receiver does not support the command \"" +
+                                                            command.name + "\""));
 }
 
 void Rover::count() {

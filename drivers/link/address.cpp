@@ -27,12 +27,13 @@ Result<Address> serial(std::string_view text, std::string_view rest) {
   Address out;
   const auto question = rest.find('?');
   out.path = std::string(rest.substr(0, question));
-  if (out.path.empty() || out.path.front() != '/') return bad(text, "a serial port is an absolute path");
+  if (out.path.empty() || out.path.front() != '/')
+    return bad(text, "a serial port must be an absolute path, like /dev/ttyUSB0");
   if (question == std::string_view::npos) return out;
   auto query = rest.substr(question + 1);
   if (!take_prefix(query, "baud=")) return bad(text, "the only option of a serial port is ?baud=");
   if (!whole_number(query, out.baud) || out.baud < 1200 || out.baud > 4'000'000) {
-    return bad(text, "baud is a number from 1200 to 4000000");
+    return bad(text, "baud must be a number from 1200 to 4000000");
   }
   return out;
 }
@@ -48,13 +49,13 @@ Result<Address> socket(std::string_view text, std::string_view rest, Kind kind) 
   } else if (host.find(':') != std::string_view::npos) {
     return bad(text, "write an IPv6 address in brackets");
   }
-  if (host.find_first_of("/?#@ ") != std::string_view::npos) return bad(text, "this is no host name");
+  if (host.find_first_of("/?#@ ") != std::string_view::npos) return bad(text, "this is not a host name");
   out.host = std::string(host);
   if (!whole_number(rest.substr(colon + 1), out.port))
-    return bad(text, "the port is a number from 0 to 65535");
+    return bad(text, "the port must be a number from 0 to 65535");
   const bool connects =
       kind == Kind::tcp || (kind == Kind::udp && !host.empty() && host != "0.0.0.0" && host != "::");
-  if (connects && out.port == 0) return bad(text, "port 0 cannot be connected to");
+  if (connects && out.port == 0) return bad(text, "port 0 cannot be used to connect");
   if (kind == Kind::tcp && host.empty()) return bad(text, "the host is missing");
   return out;
 }
@@ -68,7 +69,7 @@ Result<Address> parse_address(std::string_view text) {
   if (take_prefix(rest, "tcp://")) return socket(text, rest, Kind::tcp);
   if (take_prefix(rest, "tcp-listen://")) return socket(text, rest, Kind::tcp_listen);
   if (take_prefix(rest, "udp://")) return socket(text, rest, Kind::udp);
-  return bad(text, "begin with serial:, tcp://, tcp-listen:// or udp://");
+  return bad(text, "must begin with serial:, tcp://, tcp-listen:// or udp://");
 }
 
 bool others_may_reach(const Address& address) {

@@ -57,10 +57,11 @@ void Shared::lost(const Error& why) {
 
 Error ended(const Address& address, const ErrorCode& error, bool wrote_too_long) {
   const auto where = to_string(address) + ": ";
-  if (wrote_too_long) return make_error(Errc::link_lost, where + "the device takes no bytes any more");
+  if (wrote_too_long) return make_error(Errc::link_lost, where + "the device no longer accepts data");
   if (error == asio::error::eof || error == boost::system::errc::io_error) {
-    return make_error(Errc::link_lost,
-                      where + (address.kind == Kind::serial ? "unplugged" : "the other side closed"));
+    return make_error(
+        Errc::link_lost,
+        where + (address.kind == Kind::serial ? "unplugged" : "the other side closed the connection"));
   }
   if (error == asio::error::connection_refused) {
     return make_error(Errc::not_found, where + "refused: is the service of the device switched on?");

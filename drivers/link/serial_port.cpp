@@ -64,7 +64,7 @@ Error explained(const std::string& path, int error) {
       return make_error(Errc::conflict, path + ": busy: another program has this port open");
     case ENOTTY:
     case EISDIR:
-      return make_error(Errc::invalid_argument, path + ": this is no serial port");
+      return make_error(Errc::invalid_argument, path + ": this is not a serial port");
     default:
       return make_error(Errc::link_lost, path + ": " + std::strerror(error));
   }
@@ -112,7 +112,7 @@ Result<int> open_serial(const std::string& path, int baud) {
       std::find_if(k_bauds.begin(), k_bauds.end(), [&](const Baud& b) { return b.rate == baud; });
   if (known == k_bauds.end()) {
     return make_error(Errc::invalid_argument,
-                      path + ": " + std::to_string(baud) + " baud is not a usual rate");
+                      path + ": " + std::to_string(baud) + " baud is not a supported rate");
   }
   struct stat info {};
   if (::stat(path.c_str(), &info) != 0) return explained(path, errno);

@@ -67,9 +67,9 @@ class Pump : public std::enable_shared_from_this<Pump<Stream>> {
     const bool idle = queue_.empty();
     if (!queue_.push(bytes)) {
       ++shared_->counters.writes_refused;
-      return make_error(Errc::queue_full, "the device does not take what is sent: " +
+      return make_error(Errc::queue_full, "the device does not accept the data that is sent: " +
                                               std::to_string(shared_->options.write_queue_bytes) +
-                                              " bytes wait already");
+                                              " bytes are waiting");
     }
     if (idle && !queue_.empty()) send();
     return boost::outcome_v2::success();

@@ -139,7 +139,7 @@ class ListenLink final : public ByteLink {
   }
 
   Result<void> write(std::string_view bytes) override {
-    if (!state_->peer) return make_error(Errc::link_lost, "nobody has connected yet");
+    if (!state_->peer) return make_error(Errc::link_lost, "no device has connected yet");
     return state_->peer->write(bytes);
   }
 

@@ -104,11 +104,11 @@ class UdpLink final : public ByteLink {
 
     Result<void> write(std::string_view bytes) {
       if (!shared->open) return make_error(Errc::link_lost, "the socket is not open");
-      if (!remote) return make_error(Errc::link_lost, "nobody has sent anything yet");
+      if (!remote) return make_error(Errc::link_lost, "nothing has been received yet");
       const bool idle = queue.empty();
       if (!queue.push(bytes)) {
         ++shared->counters.writes_refused;
-        return make_error(Errc::queue_full, "the network does not take what is sent");
+        return make_error(Errc::queue_full, "the network does not accept the data that is sent");
       }
       if (idle && !queue.empty()) send();
       return boost::outcome_v2::success();

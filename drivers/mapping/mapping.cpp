@@ -72,7 +72,7 @@ class Reader {
       if (list->is_string())
         out.list = place(*list, "/array", {});
       else
-        faults_.add("/array", "must be a JSON pointer; \"\" is the whole message");
+        faults_.add("/array", "must be a JSON pointer; \"\" means the whole message");
     }
     out.tag = needed_place("tag");
     out.anchor = needed_place("anchor");
@@ -108,7 +108,7 @@ class Reader {
       if (std::ranges::find(names, name) != names.end()) continue;
       std::string all;
       for (const auto one : names) all += (all.empty() ? "" : ", ") + std::string(one);
-      faults_.add(where + '/' + to_utf8(name, k_most_word), "there is no such key; there are " + all);
+      faults_.add(where + '/' + to_utf8(name, k_most_word), "there is no such key; the keys are " + all);
     }
   }
   std::string word(const Json& value, const std::string& where) {
@@ -131,7 +131,7 @@ class Reader {
       faults_.add(
           where,
           '"' + text +
-              "\" is no JSON pointer: like \"/tag/id\" in the element, \"#/tag\" in the whole message");
+              "\" is not a JSON pointer: write \"/tag/id\" for the element, \"#/tag\" for the whole message");
     else
       out.path = std::move(*path);
     return out;
@@ -244,7 +244,7 @@ class Reader {
         faults_.add(where + "/wrap_bits", "must be 8 to 48, of a clock \"device\"");
     }
     if (time.of_device && time.unit == TimeUnit::rfc3339)
-      faults_.add(where, "a device's own clock counts; rfc3339 is Unix time");
+      faults_.add(where, "the device's own clock counts up; rfc3339 is Unix time: use clock utc");
     out.time = time;
   }
 

@@ -47,7 +47,7 @@ void Ndjson::line(const device::Arrival& at) {
 void Ndjson::closed(const device::Arrival&) { decoder_.closed(); }
 
 void Ndjson::command(const device::Command& command, const device::Arrival&) {
-  out_.answer(command.id, make_error(Errc::unsupported, "a tag that sends NDJSON takes no commands"));
+  out_.answer(command.id, make_error(Errc::unsupported, "a tag that sends NDJSON does not support commands"));
 }
 
 Result<std::unique_ptr<device::Driver>> make_ndjson(std::string_view options_json, bool datagrams,
@@ -58,10 +58,11 @@ Result<std::unique_ptr<device::Driver>> make_ndjson(std::string_view options_jso
     if (key != "mapping") return make_error(Errc::invalid_argument, key + ": an ndjson device has mapping");
   }
   if (!options.contains("mapping"))
-    return make_error(Errc::invalid_argument, "mapping: is needed, an object that says where each value is");
+    return make_error(Errc::invalid_argument,
+                      "mapping: is needed: an object that gives the place of each value");
   BOOST_OUTCOME_TRY(auto mapping, parse_mapping(to_wire(options["mapping"])));
   if (!mapping.topic.empty())
-    return make_error(Errc::invalid_argument, "mapping/topic: there are no topics on a line; take it out");
+    return make_error(Errc::invalid_argument, "mapping/topic: lines have no topics: remove it");
   return std::unique_ptr<device::Driver>(std::make_unique<Ndjson>(std::move(mapping), datagrams, output));
 }
 

@@ -41,7 +41,7 @@ struct Head {
 Result<std::optional<Head>> head_of(std::string_view held) {
   Head out{1, 0};
   for (int shift = 0;; shift += 7) {
-    if (shift > 21) return make_error(Errc::bad_frame, "a length of more than four bytes: this is no MQTT");
+    if (shift > 21) return make_error(Errc::bad_frame, "a length of more than four bytes: this is not MQTT");
     if (out.bytes >= held.size()) return std::optional<Head>{};
     const auto byte = static_cast<unsigned char>(held[out.bytes++]);
     out.body |= static_cast<std::size_t>(byte & 0x7f) << shift;
@@ -133,7 +133,7 @@ Result<void> PacketReader::take(std::string_view bytes, const std::function<void
     if (head->body > most_) {
       if (type != PacketType::publish)
         return make_error(Errc::bad_frame,
-                          "a packet of " + std::to_string(head->body) + " bytes that is no message");
+                          "a packet of " + std::to_string(head->body) + " bytes that is not a message");
       skip_ = head->body;
       held_.clear();
       skipped();

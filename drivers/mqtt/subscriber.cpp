@@ -29,17 +29,17 @@ std::optional<std::string> first_line(const std::string& file) {
 std::string refusal(unsigned code) {
   switch (code) {
     case 1:
-      return "the broker does not speak MQTT 3.1.1";
+      return "the broker does not support MQTT 3.1.1";
     case 2:
-      return "the broker refuses our client id";
+      return "the broker rejects the client id";
     case 3:
       return "the broker is not available";
     case 4:
-      return "the broker refuses user or password";
+      return "the broker rejects the user or the password";
     case 5:
-      return "the broker does not authorize us: check user and password";
+      return "the broker does not authorize this connection: check user and password";
     default:
-      return "the broker refuses us with code " + std::to_string(code);
+      return "the broker rejects the connection with code " + std::to_string(code);
   }
 }
 
@@ -78,7 +78,7 @@ void Subscriber::bytes(std::string_view bytes, const device::Arrival& at) {
   // What else speaks first would be waited for as if it were a long packet.
   if (std::exchange(first_, false) &&
       static_cast<PacketType>(static_cast<unsigned char>(bytes[0]) >> 4) != PacketType::connack)
-    return refuse("this is no MQTT broker", 30);
+    return refuse("this is not an MQTT broker", 30);
   const auto taken = reader_.take(
       bytes, [&](const Packet& one) { packet(one, at); }, [&] { out_.dropped("too_large"); });
   if (!taken && state_ != State::refused) refuse(taken.error().message, 5);
@@ -92,7 +92,7 @@ void Subscriber::packet(const Packet& one, const device::Arrival& at) {
       return accepted(one, at);
     case PacketType::suback:
       if (one.body.size() != 3 || one.body[2] != 0)
-        return refuse("the broker refuses the subscription to \"" + options_.topic + '"', 30);
+        return refuse("the broker rejects the subscription to \"" + options_.topic + '"', 30);
       state_ = State::live;
       deadline_ns_ = at.steady_ns + k_ping_ns;
       return out_.heard();
@@ -107,12 +107,13 @@ void Subscriber::packet(const Packet& one, const device::Arrival& at) {
     case PacketType::disconnect:
       break;
   }
-  refuse("a packet of type " + std::to_string(static_cast<unsigned>(one.type)) + ", which no broker sends",
-         5);
+  refuse(
+      "a packet of type " + std::to_string(static_cast<unsigned>(one.type)) + ", which a broker never sends",
+      5);
 }
 
 void Subscriber::accepted(const Packet& one, const device::Arrival& at) {
-  if (state_ != State::connecting || one.body.size() != 2) return refuse("this is no MQTT broker", 30);
+  if (state_ != State::connecting || one.body.size() != 2) return refuse("this is not an MQTT broker", 30);
   const auto code = static_cast<unsigned char>(one.body[1]);
   if (code != 0) return refuse(refusal(code), 30);
   device::Identity identity;
@@ -127,7 +128,7 @@ void Subscriber::message(const Packet& one, const device::Arrival& at) {
   const auto message = message_of(one);
   if (!message) return refuse(message.error().message, 5);
   const auto& m = message.value();
-  if (m.qos == 2) return refuse("a message of QoS 2, which was not asked for", 5);
+  if (m.qos == 2) return refuse("a message of QoS 2, which was not requested", 5);
   if (m.qos == 1) out_.send(puback_packet(m.id));
   if (m.retained) return out_.dropped("retained");
   if (auto* ranges = std::get_if<mapping::Decoder>(&decoder_))
@@ -140,7 +141,7 @@ void Subscriber::tick(const device::Arrival& now) {
   if (!deadline_ns_ || now.steady_ns < *deadline_ns_) return;
   if (state_ == State::connecting) return refuse("no answer: is this an MQTT broker, without TLS?", 5);
   if (state_ == State::subscribing) return refuse("no answer to the subscription", 5);
-  if (now.steady_ns - last_ns_ > k_answer_ns) return refuse("the broker does not answer any more", 1);
+  if (now.steady_ns - last_ns_ > k_answer_ns) return refuse("the broker no longer answers", 1);
   out_.send(ping_packet());
   deadline_ns_ = now.steady_ns + k_ping_ns;
 }
@@ -155,9 +156,9 @@ void Subscriber::command(const device::Command& command, const device::Arrival&)
   const auto* positions = std::get_if<PozyxPositions>(&decoder_);
   if (command.name == "positions" && positions != nullptr) return out_.answer(command.id, positions->json());
   out_.answer(command.id,
-              make_error(Errc::unsupported, positions != nullptr
-                                                ? "a Pozyx position stream answers positions, nothing else"
-                                                : "ranges from MQTT take no commands"));
+              make_error(Errc::unsupported,
+                         positions != nullptr ? "a Pozyx position stream supports only the command positions"
+                                              : "a device of ranges from MQTT does not support commands"));
 }
 
 Result<std::unique_ptr<device::Driver>> make_subscriber(std::string_view options_json,
@@ -174,7 +175,7 @@ Result<std::unique_ptr<device::Driver>> make_subscriber(std::string_view options
   for (const auto& [key, value] : options.items()) {
     const bool text = value.is_string() && value.get_ref<const std::string&>().size() <= 1000;
     if (key == "format") {
-      if (value != "mapping" && value != "pozyx") return bad(key, "one of mapping, pozyx");
+      if (value != "mapping" && value != "pozyx") return bad(key, "must be one of mapping, pozyx");
       pozyx = value == "pozyx";
     } else if (key == "mapping") {
       BOOST_OUTCOME_TRY(out.mapping, mapping::parse_mapping(to_wire(value)));
@@ -182,18 +183,20 @@ Result<std::unique_ptr<device::Driver>> make_subscriber(std::string_view options
       topic = text ? value.get<std::string>() : "";
       if (const auto wrong = mapping::wrong_filter(topic); !wrong.empty()) return bad(key, wrong);
     } else if (key == "user") {
-      if (!text) return bad(key, "a name");
+      if (!text) return bad(key, "must be a name");
       out.user = value.get<std::string>();
     } else if (key == "password_file") {
-      if (!text) return bad(key, "a path");
+      if (!text) return bad(key, "must be a path");
       out.password_file = value.get<std::string>();
     } else {
-      return bad(key, "an mqtt device has format, mapping, topic, user, password");
+      return bad(key, "no such option: an mqtt device has format, mapping, topic, user, password");
     }
   }
-  if (pozyx && out.mapping) return bad("mapping", "the format pozyx has its own; take one of them out");
-  if (!pozyx && !out.mapping) return bad("mapping", "is needed, an object that says where each value is");
-  if (!out.password_file.empty() && out.user.empty()) return bad("user", "a password needs one");
+  if (pozyx && out.mapping)
+    return bad("mapping", "the format pozyx has a mapping of its own: remove one of the two");
+  if (!pozyx && !out.mapping)
+    return bad("mapping", "is needed: an object that gives the place of each value");
+  if (!out.password_file.empty() && out.user.empty()) return bad("user", "a password needs a user");
   out.topic = !topic.empty() ? topic : out.mapping ? out.mapping->topic : std::string(k_pozyx_topics);
   if (out.topic.empty()) return bad("mapping/topic", "is needed, like \"uwb/+/ranges\"");
   // Section 3.1.3.1: 23 letters and digits are what every broker takes.

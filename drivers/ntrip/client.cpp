@@ -118,7 +118,7 @@ void Client::bytes(std::string_view bytes, const device::Arrival& at) {
   if (state_ == State::stream) return stream(bytes);
   held_ += bytes;
   if (held_.size() > k_most_head && state_ != State::table)
-    return refuse("the caster's answer is no NTRIP", 30);
+    return refuse("the caster's answer is not NTRIP", 30);
   head(at);
 }
 
@@ -165,7 +165,7 @@ bool Client::status_line(const std::string& line) {
     return true;
   }
   if (code == 401) {
-    refuse("the caster rejects user or password", 60);
+    refuse("the caster rejects the user or the password", 60);
   } else if (code == 404) {
     refuse("the caster has no mount \"" + options_.mount + "\"", 60);
   } else if (code == 409) {
@@ -233,7 +233,7 @@ void Client::unchunk(std::string_view bytes) {
     bytes.remove_prefix(1);
     if (c != '\n') {
       if (c != '\r') held_ += c;
-      if (held_.size() > 64) refuse("the caster's chunks cannot be read", 30);
+      if (held_.size() > 64) refuse("the caster's stream is damaged (chunked encoding)", 30);
       continue;
     }
     if (held_.empty()) continue;  // the end of the chunk before
@@ -241,7 +241,7 @@ void Client::unchunk(std::string_view bytes) {
     const auto size = std::strtoull(held_.c_str(), &end, 16);
     const bool good = end != held_.c_str() && size <= k_most_chunk;
     held_.clear();
-    if (!good) refuse("the caster's chunks cannot be read", 30);
+    if (!good) refuse("the caster's stream is damaged (chunked encoding)", 30);
     if (good && size == 0) refuse("the caster ended the stream", 5);
     chunk_left_ = good ? static_cast<std::size_t>(size) : 0;
   }
@@ -260,11 +260,12 @@ void Client::tick(const device::Arrival& now) {
   if (state_ == State::stream) return send_position(now);
   if (state_ == State::table) return table_end();
   if (state_ == State::maybe_headers) return begin_stream(now);
-  refuse("no answer of the caster within 10 s", 10);
+  refuse("no answer from the caster within 10 s", 10);
 }
 
 void Client::command(const device::Command& command, const device::Arrival&) {
-  out_.answer(command.id, make_error(Errc::unsupported, "a caster takes no \"" + command.name + "\""));
+  out_.answer(command.id, make_error(Errc::unsupported, "an NTRIP caster does not support the command \"" +
+                                                            command.name + "\""));
 }
 
 }  // namespace anchord::ntrip

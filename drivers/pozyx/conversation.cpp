@@ -120,10 +120,10 @@ Script<Result<Bytes>> Conversation::call(std::uint8_t function, Bytes parameters
     const std::string proof = read_line(reg::who_am_i, 1);
     Result<Bytes> who = co_await ask(proof, 1);
     if (who && who.value().front() == k_who_am_i) {
-      co_return make_error(Errc::conflict, "the tag refuses " + question.substr(0, question.size() - 1));
+      co_return make_error(Errc::conflict, "the tag rejects " + question.substr(0, question.size() - 1));
     }
   }
-  Error why = make_error(Errc::bad_frame, "an answer of another question");
+  Error why = make_error(Errc::bad_frame, "an answer to another request");
   if (!reply) why = reply.error();
   const Error error = co_await lost_track(why);
   co_return error;
@@ -153,7 +153,7 @@ Script<Result<void>> Conversation::resync() {
     }
     quiet_ns_ = options_.patience_ns + options_.quiet_ns;  // its answers are slower than thought
   }
-  co_return make_error(Errc::link_lost, "no Pozyx answers on this port");
+  co_return make_error(Errc::link_lost, "no Pozyx tag answers on this port");
 }
 
 }  // namespace anchord::pozyx

@@ -210,8 +210,8 @@ Script<Result<UwbSettings>> Tag::set_uwb(UwbSettings settings) {
   const Result<UwbSettings> read = co_await uwb();
   if (!read) co_return read.error();
   if (!same_air(settings, read.value())) {
-    co_return make_error(Errc::conflict,
-                         "asked for " + to_string(settings) + ", reads " + to_string(read.value()));
+    co_return make_error(
+        Errc::conflict, "set to " + to_string(settings) + ", but the tag reports " + to_string(read.value()));
   }
   co_return read;
 }
@@ -223,7 +223,7 @@ Script<Result<void>> Tag::set_sensors_mode(std::uint8_t mode) {
   Result<Bytes> read = co_await wire_.read(reg::sensors_mode, 1);
   if (!read) co_return read.error();
   sensors_mode_ = read.value()[0];
-  if (sensors_mode_ != mode) co_return make_error(Errc::conflict, "the sensors stay in their mode");
+  if (sensors_mode_ != mode) co_return make_error(Errc::conflict, "the sensors do not change their mode");
   co_return boost::outcome_v2::success();
 }
 

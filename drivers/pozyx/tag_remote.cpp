@@ -162,7 +162,7 @@ Script<Result<Applied>> Tag::set_uwb_everywhere(UwbSettings settings, std::vecto
       device.done = theirs && same_air({settings.channel, settings.rate, settings.prf,
                                         settings.preamble_symbols, std::nullopt},
                                        theirs.value());
-      device.why = device.done ? "" : "reads other settings";
+      device.why = device.done ? "" : "still has other settings";
       if (device.done && settings.gain_db) {
         Bytes gain{gain_register(*settings.gain_db)};
         const Result<void> written = co_await remote_write(device.id, reg::uwb_gain, gain);
@@ -191,8 +191,8 @@ Script<Result<Applied>> Tag::set_uwb_everywhere(UwbSettings settings, std::vecto
     if (registers) theirs = uwb_settings(registers.value());
     const bool follows =
         theirs && same_air({old.channel, old.rate, old.prf, old.preamble_symbols, {}}, theirs.value());
-    if (device.done && follows) device.why = "back on the old settings";
-    if (!follows) device.why = "answers on neither settings: " + device.why;
+    if (device.done && follows) device.why = "back to the old settings";
+    if (!follows) device.why = "answers neither on the new nor on the old settings: " + device.why;
     out.rolled_back = out.rolled_back && (follows || !device.done);
     device.done = false;
   }
@@ -201,7 +201,7 @@ Script<Result<Applied>> Tag::set_uwb_everywhere(UwbSettings settings, std::vecto
 
 Script<Result<Applied>> Tag::push_positions(std::vector<DeviceInfo> devices, bool save) {
   if (devices.empty() || devices.size() > k_max_devices)
-    co_return make_error(Errc::invalid_argument, "1 to 20 devices fit into a tag");
+    co_return make_error(Errc::invalid_argument, "a tag stores 1 to 20 devices");
   std::vector<Bytes> parameters;
   for (const DeviceInfo& device : devices) {
     Result<Bytes> one = device_add_parameters(device);
@@ -231,7 +231,7 @@ Script<Result<Applied>> Tag::push_positions(std::vector<DeviceInfo> devices, boo
     if (!stored) {
       outcome.why = stored.error().message;
     } else if (!near_mm(stored.value().local_m, device.local_m)) {
-      outcome.why = "the tag stores another position";
+      outcome.why = "the tag stored another position";
     } else {
       Bytes coordinates(parameters[i].begin() + 3, parameters[i].end());
       const Result<void> told = co_await remote_write(device.id, reg::pos_x, coordinates);
@@ -240,8 +240,8 @@ Script<Result<Applied>> Tag::push_positions(std::vector<DeviceInfo> devices, boo
       if (read && read.value() == coordinates) {
         outcome.done = true;
       } else {
-        outcome.why =
-            "in the tag, not in the anchor: " + (read ? "it reads otherwise" : read.error().message);
+        outcome.why = "stored in the tag, not in the anchor: " +
+                      (read ? "it reports another position" : read.error().message);
       }
     }
     out.all = out.all && outcome.done;

@@ -67,7 +67,9 @@ void Unit::closed(const Arrival&) {
 void Unit::command(const device::Command& command, const Arrival& now) {
   if (!session_) return out_.answer(command.id, make_error(Errc::link_lost, "the tag is not connected"));
   if (commands_.size() >= k_max_commands)
-    return out_.answer(command.id, make_error(Errc::queue_full, "the tag has 16 commands to do"));
+    return out_.answer(
+        command.id,
+        make_error(Errc::queue_full, "16 commands are already waiting for the tag: wait for their answers"));
   commands_.push_back(command);
   session_->wire.set_now(now.steady_ns);
   after();

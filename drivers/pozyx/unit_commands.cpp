@@ -22,37 +22,37 @@ Json object_of(std::string_view text) {
 
 Result<std::uint16_t> id_of(std::string_view option, const Json& value) {
   const auto id = value.is_string() ? parse_network_id(value.get_ref<const std::string&>())
-                                    : Result<NetworkId>(bad(option, "text"));
+                                    : Result<NetworkId>(bad(option, "must be text"));
   if (!id || id.value().value == 0 || id.value().value > 0xffff)
-    return bad(option, "a network id like \"0x6a21\"");
+    return bad(option, "must be a network id like \"0x6a21\"");
   return static_cast<std::uint16_t>(id.value().value);
 }
 
 Result<double> number_of(std::string_view option, const Json& value, double min, double max) {
   if (!value.is_number() || !(value.get<double>() >= min) || !(value.get<double>() <= max))
-    return bad(option, "a number");
+    return bad(option, "must be a number");
   return value.get<double>();
 }
 
 Result<UwbSettings> uwb_of(const Json& value, UwbSettings settings) {
-  if (!value.is_object()) return bad("uwb", "an object");
+  if (!value.is_object()) return bad("uwb", "must be an object");
   for (const auto& [key, v] : value.items()) {
     if (key == "all" || key == "devices") continue;
     BOOST_OUTCOME_TRY(const double number, number_of(key, v, 0, 10'000));
     if (key == "channel") {
       settings.channel = static_cast<std::uint8_t>(std::min(number, 255.0));
     } else if (key == "rate_kbps") {
-      if (number != 110 && number != 850 && number != 6810) return bad(key, "110, 850 or 6810");
+      if (number != 110 && number != 850 && number != 6810) return bad(key, "must be 110, 850 or 6810");
       settings.rate = static_cast<std::uint8_t>(number == 110 ? 0 : number == 850 ? 1 : 2);
     } else if (key == "prf_mhz") {
-      if (number != 16 && number != 64) return bad(key, "16 or 64");
+      if (number != 16 && number != 64) return bad(key, "must be 16 or 64");
       settings.prf = number == 16 ? Prf::mhz16 : Prf::mhz64;
     } else if (key == "preamble_symbols") {
       settings.preamble_symbols = static_cast<int>(number);
     } else if (key == "gain_db") {
       settings.gain_db = number;
     } else {
-      return bad(key, "UWB has channel, rate_kbps, prf_mhz, preamble_symbols, gain_db");
+      return bad(key, "no such setting: uwb has channel, rate_kbps, prf_mhz, preamble_symbols, gain_db");
     }
   }
   BOOST_OUTCOME_TRY(uwb_registers(settings));
@@ -123,7 +123,7 @@ std::string light_text(std::uint16_t id) {
 }
 
 Result<std::vector<std::uint16_t>> ids_of(std::string_view option, const Json& value) {
-  if (!value.is_array() || value.size() > 1000) return bad(option, "a list of network ids");
+  if (!value.is_array() || value.size() > 1000) return bad(option, "must be a list of network ids");
   std::vector<std::uint16_t> out;
   for (const Json& one : value) {
     BOOST_OUTCOME_TRY(const std::uint16_t id, id_of(option, one));
@@ -138,18 +138,19 @@ Result<UnitOptions> unit_options(const Json& json) {
     if (key == "anchors") {
       BOOST_OUTCOME_TRY(out.anchors, ids_of(key, value));
     } else if (key == "cir") {
-      if (value != "none" && value != "window" && value != "whole") return bad(key, "none, window or whole");
+      if (value != "none" && value != "window" && value != "whole")
+        return bad(key, "must be none, window or whole");
       out.cir = value == "none" ? CirRead::none : value == "window" ? CirRead::window : CirRead::whole;
     } else if (key == "uwb") {
       BOOST_OUTCOME_TRY(const UwbSettings settings, uwb_of(value, {}));
       out.uwb = settings;
     } else if (key == "heading") {
-      if (!value.is_boolean()) return bad(key, "true or false");
+      if (!value.is_boolean()) return bad(key, "must be true or false");
       out.heading = value.get<bool>();
     } else if (key == "anchor_anchor_s") {
       BOOST_OUTCOME_TRY(out.anchor_anchor_s, number_of(key, value, 0, 86'400));
     } else {
-      return bad(key, "a pozyx device has anchors, cir, uwb, heading, anchor_anchor_s");
+      return bad(key, "no such option: a pozyx device has anchors, cir, uwb, heading, anchor_anchor_s");
     }
   }
   return out;
@@ -162,15 +163,16 @@ struct Push {
 Result<Push> push_of(const Json& json) {
   Push out;
   if (!json.is_object() || !json.contains("positions") || !json["positions"].is_array())
-    return bad("positions", "a list of {network_id, x_m, y_m, z_m}");
+    return bad("positions", "must be a list of {network_id, x_m, y_m, z_m}");
   out.save = json.value("save", Json(false)) == Json(true);
   for (const Json& one : json["positions"]) {
-    if (!one.is_object() || !one.contains("network_id")) return bad("positions", "each needs its network_id");
+    if (!one.is_object() || !one.contains("network_id"))
+      return bad("positions", "each item needs its network_id");
     BOOST_OUTCOME_TRY(const std::uint16_t id, id_of("network_id", one["network_id"]));
     DeviceInfo device{id, true, {}};
     int axis = 0;
     for (const char* key : {"x_m", "y_m", "z_m"}) {
-      if (!one.contains(key)) return bad(key, "required");
+      if (!one.contains(key)) return bad(key, "is required");
       BOOST_OUTCOME_TRY(device.local_m[axis++], number_of(key, one[key], -2e6, 2e6));
     }
     out.devices.push_back(device);
@@ -267,7 +269,7 @@ Script<Result<std::string>> Unit::get_uwb(std::string arguments) {
     for (const auto& [id, anchor] : anchors_) ids.push_back(id);
     out["devices"] = Json::array();
     for (const std::uint16_t id : ids) {
-      Result<Bytes> registers = make_error(Errc::link_lost, "not asked: the others took too long");
+      Result<Bytes> registers = make_error(Errc::link_lost, "not asked: the other devices took too long");
       if (session_->wire.now_ns() < until_ns)
         registers = co_await session_->tag.remote_read(id, reg::uwb_channel, 4);
       out_.heard();  // it ranged to nobody meanwhile
@@ -312,7 +314,7 @@ Script<Result<std::string>> Unit::push_positions(std::string arguments) {
 Script<Result<std::string>> Unit::range_between(std::string arguments) {
   const Json json = object_of(arguments);
   if (!json.is_object() || !json.contains("from") || !json.contains("to"))
-    co_return bad("from, to", "both required");
+    co_return bad("from, to", "both are required");
   const Result<std::uint16_t> from = id_of("from", json["from"]), to = id_of("to", json["to"]);
   if (!from) co_return from.error();
   if (!to) co_return to.error();

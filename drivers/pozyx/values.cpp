@@ -41,7 +41,7 @@ Result<UwbSettings> uwb_settings(ByteView four_registers) {
                                       [&](const Preamble& p) { return p.code == four_registers[2]; });
   if (!channel_exists(settings.channel) || settings.rate > 2 || prf < 1 || prf > 2 ||
       preamble == k_preambles.end()) {
-    return make_error(Errc::bad_frame, "UWB registers " + hex(four_registers) + " mean nothing");
+    return make_error(Errc::bad_frame, "UWB registers " + hex(four_registers) + " are not valid");
   }
   settings.prf = prf == 1 ? Prf::mhz16 : Prf::mhz64;
   settings.preamble_symbols = preamble->symbols;
@@ -114,7 +114,7 @@ Result<Bytes> device_add_parameters(const DeviceInfo& device) {
     const double mm = metres * 1000.0;
     if (!(std::abs(mm) <= 2147483647.0)) {  // false for NaN
       return make_error(Errc::invalid_argument, "coordinate " + std::to_string(metres) +
-                                                    " m does not fit: positions go in a local frame");
+                                                    " m is too large: give positions in a local frame");
     }
     put_u32(out, static_cast<std::uint32_t>(static_cast<std::int32_t>(std::llround(mm))));
   }

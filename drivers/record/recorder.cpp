@@ -215,7 +215,7 @@ void Recorder::State::sync_loop() {
     if (holds || now->file != file) continue;
     taken_away = true;
     now->unsynced =
-        file.string() + ": was removed, renamed or replaced; what comes next goes to another part";
+        file.string() + ": was removed, renamed or replaced; what follows is written to another file";
   }
 }
 
@@ -264,7 +264,7 @@ void Recorder::take(const Event& event) {
   if (s.scarce) {
     ++s.lost;
     return s.fail(event.at.steady_ns, "less than " + std::to_string(s.options.keep_free_bytes >> 20) +
-                                          " MiB free on the disk, which rows need: make room");
+                                          " MiB free on the disk, kept for measurements: free some space");
   }
   // After a failure the old part may end in half a record: what comes goes to a new one.
   // So does what comes after a part was removed, renamed or replaced: nobody would find it there.

@@ -50,11 +50,11 @@ class Pty final : public Port {
   Result<void> up() override {
     down();
     master_ = ::posix_openpt(O_RDWR | O_NOCTTY | O_CLOEXEC | O_NONBLOCK);
-    if (master_ < 0) return failed("cannot make a pty");
+    if (master_ < 0) return failed("cannot create a pty");
     std::array<char, 128> name{};
     if (::grantpt(master_) != 0 || ::unlockpt(master_) != 0 ||
         ::ptsname_r(master_, name.data(), name.size()) != 0) {
-      return failed("cannot make a pty");
+      return failed("cannot create a pty");
     }
     path_ = name.data();
     // Raw from the beginning: no echo of what a host says before it has set its own mode.
@@ -70,7 +70,7 @@ class Pty final : public Port {
     // A link of another simulator may be taken over; a device or file of that name is somebody's.
     const auto there = std::filesystem::symlink_status(link_, error);
     if (std::filesystem::exists(there) && !std::filesystem::is_symlink(there))
-      return make_error(Errc::conflict, link_ + ": is there already, and no link");
+      return make_error(Errc::conflict, link_ + ": already exists and is not a link");
     error.clear();
     const std::string part = link_ + ".part";
     std::filesystem::remove(part, error);
@@ -135,7 +135,7 @@ class Tcp final : public Port {
   Result<void> up() override {
     down();
     listener_ = ::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
-    if (listener_ < 0) return failed("cannot make a socket");
+    if (listener_ < 0) return failed("cannot create a socket");
     const int yes = 1;
     ::setsockopt(listener_, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes);
     sockaddr_in at{};

@@ -39,20 +39,20 @@ Result<void> check(const Scenario& scenario) {
   for (const WorldAnchor& anchor : scenario.world.anchors) {
     if (anchor.id.value == 0 || anchor.id.value > 0xffff)
       return refuse("anchor id " + to_string(anchor.id) + " is not in 0x0001..0xffff");
-    if (!ids.insert(anchor.id).second) return refuse("anchor " + to_string(anchor.id) + " is there twice");
+    if (!ids.insert(anchor.id).second) return refuse("anchor " + to_string(anchor.id) + " occurs twice");
   }
   for (const TagSetup& tag : scenario.tags) {
-    if (!ids.insert(tag.id).second) return refuse("device id " + to_string(tag.id) + " is there twice");
-    if (!names.insert(tag.name).second) return refuse("two devices are called " + tag.name);
+    if (!ids.insert(tag.id).second) return refuse("device id " + to_string(tag.id) + " occurs twice");
+    if (!names.insert(tag.name).second) return refuse("two devices have the name " + tag.name);
     if (tag.range_s && !positive(*tag.range_s)) return refuse("range_s of " + tag.name + " must be positive");
   }
   for (const RoverSetup& rover : scenario.rovers) {
-    if (!names.insert(rover.name).second) return refuse("two devices are called " + rover.name);
+    if (!names.insert(rover.name).second) return refuse("two devices have the name " + rover.name);
     if (!positive(rover.rate_hz) || rover.rate_hz > 100)
       return refuse("rate_hz of " + rover.name + " must be in 0..100");
   }
   for (const Fault& fault : scenario.faults) {
-    if (!names.contains(fault.device)) return refuse("a fault names no device: " + fault.device);
+    if (!names.contains(fault.device)) return refuse("a fault names an unknown device: " + fault.device);
   }
   return boost::outcome_v2::success();
 }

@@ -28,7 +28,7 @@ class Object {
   ~Object() {
     if (!json_.is_object()) return;
     for (const auto& [key, value] : json_.items()) {
-      if (!taken_.contains(key)) fail(key, "is not known here");
+      if (!taken_.contains(key)) fail(key, "is not a known key");
     }
   }
   const Json* child(const char* key) {
@@ -98,7 +98,7 @@ class Object {
     if (const auto value = table.find(said))
       into = *value;
     else
-      fail(key, "is one of " + list_of(table.words()));
+      fail(key, "must be one of " + list_of(table.words()));
   }
   void id(const char* key, NetworkId& into) {
     std::string said;
@@ -144,7 +144,7 @@ void take_material(Object& of, Material& material) {
   if (!known) material = Material{"other", 1, 0};
   const auto permittivity = of.number("relative_permittivity"), loss = of.number("loss_db");
   if (!known && !loss)
-    of.fail("material", "is none of glass, brick, concrete, plasterboard, metal: say its loss_db");
+    of.fail("material", "is none of glass, brick, concrete, plasterboard, metal: give its loss_db");
   if (permittivity) material.relative_permittivity = *permittivity;
   if (loss) material.loss_db = *loss;
   if (material.relative_permittivity < 1 || material.loss_db < 0) of.fail("material", "is not possible");
@@ -302,7 +302,7 @@ void take_fault(Object& of, Fault& fault) {
 
 Result<Scenario> parse_scenario(std::string_view text) {
   const Json json = Json::parse(text.begin(), text.end(), nullptr, false);
-  if (json.is_discarded()) return make_error(Errc::bad_frame, "the scenario is no JSON");
+  if (json.is_discarded()) return make_error(Errc::bad_frame, "the scenario is not JSON");
   Scenario scenario = demonstration_scenario();
   std::optional<Error> error;
   {

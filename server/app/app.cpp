@@ -164,7 +164,7 @@ Result<void> App::State::first_token() {
                     access->create_token("first run", {"admin"}, std::nullopt, first_run, "local"));
   const fs::path file = data_dir / k_admin_token_file;
   BOOST_OUTCOME_TRYV(write_private(file, made.text + "\n"));
-  log(LogLevel::info, "made the first admin token", {{"file", file.string()}});
+  log(LogLevel::info, "created the first admin token", {{"file", file.string()}});
   // Only to a person: a redirected stderr is a log.
   if (isatty(STDERR_FILENO) == 1) {
     std::fprintf(stderr, "\nFirst start. The admin token, shown once (also in %s):\n\n  %s\n\n", file.c_str(),
@@ -193,22 +193,24 @@ Result<void> App::State::listen() {
                    std::to_string(port));
   }
   if (tls) {
-    metrics->gauge("anchord_tls_certificate_expiry_seconds", "Unix time at which the served certificate ends",
+    metrics->gauge("anchord_tls_certificate_expiry_seconds",
+                   "Unix time at which the served certificate expires",
                    [this] { return tls->facts().not_after.seconds(); });
-    metrics->gauge("anchord_tls_handshakes_failed", "Connections that spoke no TLS, or too slowly",
+    metrics->gauge("anchord_tls_handshakes_failed", "Connections whose TLS handshake failed or took too long",
                    [this] { return static_cast<double>(http->failed_handshakes()); });
   }
   metrics->gauge("anchord_http_connections", "Sockets open",
                  [this] { return static_cast<double>(http->connections()); });
   metrics->gauge("anchord_ws_clients", "WebSocket clients",
                  [this] { return static_cast<double>(http->websockets()); });
-  metrics->gauge("anchord_log_lost_lines", "Lines of the log that nobody read in time",
+  metrics->gauge("anchord_log_lost_lines",
+                 "Lines of the log that were dropped because standard error was not read in time",
                  [] { return static_cast<double>(lost_log_lines()); });
-  metrics->gauge("anchord_command_queue", "Commands that wait for their executor",
+  metrics->gauge("anchord_command_queue", "Commands that are waiting for their executor",
                  [this] { return static_cast<double>(command_pool->queued()); });
-  metrics->gauge("anchord_heavy_queue", "Computations that wait for their executor",
+  metrics->gauge("anchord_heavy_queue", "Computations that are waiting for their executor",
                  [this] { return static_cast<double>(heavy_pool->queued()); });
-  metrics->gauge("anchord_worker_queue", "Requests that wait for a handler",
+  metrics->gauge("anchord_worker_queue", "Requests that are waiting for a handler",
                  [this] { return static_cast<double>(pool->queued()); });
   http->start();
   BOOST_OUTCOME_TRYV(write_private(data_dir / k_address_file, local_address(urls) + "\n"));
@@ -241,8 +243,8 @@ Result<void> App::State::open_drone() {
   if (link::others_may_reach(where.value()) && !key && !config.flag("insecure")) {
     return make_error(Errc::invalid_argument,
                       "drone.address " + address +
-                          " can be reached by others, who could fly the aircraft; give "
-                          "--drone-signing-key-file (MAVLink 2 signing), or say --insecure");
+                          " can be reached from other machines, which could fly the aircraft; give "
+                          "--drone-signing-key-file (MAVLink 2 signing), or accept this with --insecure");
   }
   auto opened = flight::DroneLink::open(
       address,
@@ -279,8 +281,9 @@ Result<void> App::State::open_broker() {
     const auto local =
         is_loopback((v6 ? '[' + options.host + ']' : options.host) + ':' + std::to_string(port));
     if (options.ca_file.empty() && !(local && local.value()) && !config.flag("insecure"))
-      return bad("mqtt.password_file", "the password would go to " + options.host +
-                                           " in the clear; set mqtt.ca_file (TLS), or say --insecure");
+      return bad("mqtt.password_file",
+                 "the password would go to " + options.host +
+                     " unencrypted; set mqtt.ca_file (TLS), or accept this with --insecure");
   }
   auto opened = make_mqtt_broker(std::move(options));
   if (!opened) return bad("mqtt.ca_file", opened.error().message);
@@ -315,10 +318,11 @@ std::vector<api::AlarmCondition> App::State::alarms() const {
   if (const auto lost = devices->rows_lost(); lost > 0)
     out.push_back({"rows.lost", api::AlarmPriority::critical,
                    std::to_string(lost) +
-                       " rows of devices were not stored since the start; they are in the "
-                       "recordings of " +
+                       " measurements of devices have not been stored since the server started; they are in "
+                       "the raw recordings in " +
                        to_utf8((data_dir / "recordings").string()) +
-                       ": anchord replay RECORDING --url URL gives them to the server, once each",
+                       ": anchord replay RECORDING --url URL sends them to the server, without storing any "
+                       "of them twice",
                    std::nullopt});
   if (!tls) return out;
   for (auto& warning : tls_warnings(tls->facts(), tls->failure(), clock.now()))
@@ -444,12 +448,12 @@ Result<std::unique_ptr<App>> App::start(const Config& config, std::function<std:
 void App::reload() {
   auto& s = *state_;
   if (!s.tls) {
-    log(LogLevel::info, "nothing to reload", {{"why", "there is no tls.certificate"}});
+    log(LogLevel::info, "nothing to reload", {{"why", "tls.certificate is not set"}});
     return;
   }
   const auto reloaded = s.tls->reload(s.clock.now());
   if (!reloaded) {
-    log(LogLevel::error, "the new certificate was refused, the former is still served",
+    log(LogLevel::error, "the new certificate was rejected, the previous one is still served",
         {{"why", reloaded.error().message}});
     return;
   }

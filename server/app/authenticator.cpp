@@ -20,7 +20,7 @@ constexpr std::string_view k_omlox_path = "/omlox/v2/ws/socket";
 constexpr WsPlaceLimits k_strangers{8, 4, 0};
 constexpr std::string_view k_subprotocol = "anchord.v1";
 /// In the audit log.
-constexpr std::string_view k_unknown_token = "a token that is not known, expired or revoked";
+constexpr std::string_view k_unknown_token = "a token that is unknown, expired or revoked";
 
 bool unsafe(api::Method method) {
   return method != api::Method::get && method != api::Method::head && method != api::Method::options;
@@ -97,7 +97,7 @@ std::optional<api::Response> Authenticator::identify(api::Request& request, bool
     // A long-lived secret in an address ends in logs, histories and Referer headers.
     if (key == "token" || key == "access_token" || value.starts_with("anc_")) {
       return problem(400, "malformed",
-                     "a token in the address is not accepted; send it as Authorization: Bearer");
+                     "a token in the address is not accepted; send it in the header Authorization: Bearer");
     }
   }
   if (access_.options().auth_off) {
@@ -107,14 +107,14 @@ std::optional<api::Response> Authenticator::identify(api::Request& request, bool
     const auto who = access_.verify(secret);
     if (!who) {
       access_.note_refusal("nobody", k_unknown_token, request.remote);
-      return wrong_secret(request, secret, "the token is not known, expired or revoked");
+      return wrong_secret(request, secret, "the token is unknown, expired or revoked");
     }
     request.principal = *who;
     login = {*who, {}};
     return std::nullopt;  // no browser adds this header by itself
   } else if (const auto ticket = request.query_value("ticket"); ticket && websocket) {
     const auto made = access_.take_ticket(*ticket);
-    if (!made) return wrong_secret(request, *ticket, "the ticket is used up, expired or unknown");
+    if (!made) return wrong_secret(request, *ticket, "the ticket has been used, has expired or is unknown");
     request.principal = made->who;
     login = *made;
     return std::nullopt;
@@ -181,7 +181,7 @@ Admission Authenticator::live(api::Request& request, bool websocket, api::Login 
     return refused(problem(403, "forbidden", "live data needs the role viewer"), route);
   }
   if (!websocket)
-    return refused(upgrade_needed("malformed", "this address speaks WebSocket, subprotocol anchord.v1"),
+    return refused(upgrade_needed("malformed", "this address is a WebSocket of subprotocol anchord.v1"),
                    route);
   Admission admission;
   admission.route = route;
@@ -232,7 +232,7 @@ Admission Authenticator::live_omlox(const api::Request& request, bool websocket,
   const std::string route(k_omlox_path);
   const api::Principal& who = request.principal;
   if (!websocket && who.roles.empty())
-    return refused(problem(401, "unauthorized", "send a token as Authorization: Bearer"), route);
+    return refused(problem(401, "unauthorized", "send a token in the header Authorization: Bearer"), route);
   if (!who.roles.empty() && !may_watch(who)) {
     access_.note_refusal(who.token_id, "GET " + route, request.remote);
     return refused(problem(403, "forbidden", "live data needs the role viewer"), route);
@@ -323,13 +323,14 @@ Admission Authenticator::at_once(Admission admission, const api::Route& route, a
 Admission Authenticator::decide(api::Request& request, std::string_view host, bool websocket) {
   request.remote = options_.proxies.client(request.remote, request.header("x-forwarded-for"));
   if (closed_) {
-    auto response = problem(503, "overloaded", "the server stops");
+    auto response = problem(503, "overloaded", "the server is stopping");
     response.header("Retry-After", "5");
     return refused(std::move(response));
   }
   if ((websocket || unsafe(request.method)) &&
       !origin_allowed(request.header("origin"), host, options_.hosts)) {
-    return refused(problem(403, "forbidden", "pages of this origin are not allowed; see allowed_origins"));
+    return refused(
+        problem(403, "forbidden", "pages of this origin are not allowed; see the setting allowed_origins"));
   }
   api::Login login;
   if (auto no = identify(request, websocket, login)) return refused(std::move(*no));

@@ -87,10 +87,11 @@ Metrics::Metrics(std::string_view version) : state_(std::make_unique<State>()) {
                           .Name("anchord_http_requests_total")
                           .Help("Requests answered, by route template, method and status")
                           .Register(registry);
-  state_->durations = &prometheus::BuildHistogram()
-                           .Name("anchord_http_request_duration_seconds")
-                           .Help("From the last byte of the head to the last byte of the answer")
-                           .Register(registry);
+  state_->durations =
+      &prometheus::BuildHistogram()
+           .Name("anchord_http_request_duration_seconds")
+           .Help("Seconds from the last byte of the request head to the last byte of the answer")
+           .Register(registry);
   prometheus::BuildGauge()
       .Name("anchord_build_info")
       .Help("Always 1; the labels identify the build")

@@ -42,9 +42,9 @@ Result<ModelKey> read_or_make_model_key(const std::filesystem::path& data_dir) {
                       "cannot read " + file.string() + ": " + std::strerror(errno));
   }
   if (!S_ISREG(info.st_mode) || (info.st_mode & 077) != 0)
-    return make_error(Errc::invalid_argument, file.string() +
-                                                  " must be a file that only its owner may read: chmod "
-                                                  "600, or remove it for a new key");
+    return make_error(
+        Errc::invalid_argument,
+        file.string() + " must be readable by its owner only: chmod 600, or remove it to create a new key");
   std::ifstream in(file, std::ios::binary);
   const std::string text{std::istreambuf_iterator<char>(in), {}};
   const auto seed = api::ModelSigner::parse_seed(text);

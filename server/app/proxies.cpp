@@ -37,7 +37,7 @@ Result<TrustedProxies> TrustedProxies::parse(const std::vector<std::string>& ent
     }
     if (!good || !sized)
       return make_error(Errc::invalid_argument,
-                        "trusted_proxies: '" + entry + "' is no address or network like 10.0.0.0/8");
+                        "trusted_proxies: '" + entry + "' is not an address or network like 10.0.0.0/8");
     network.bits = v4 ? 96 + bits : bits;
     out.networks_.push_back(network);
   }

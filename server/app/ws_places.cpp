@@ -14,11 +14,13 @@ std::optional<WsPlaces::Refusal> WsPlaces::refusal(Taken& taken, const api::Prin
   const auto at = taken.by_token.find(who.token_id);
   const std::size_t own = at == taken.by_token.end() ? 0 : at->second;
   if (counted && own >= limits_.per_token) {
-    return Refusal{4029, "too_many: " + std::to_string(own) + " connections of this token; close one"};
+    return Refusal{4029,
+                   "too_many: " + std::to_string(own) + " connections of this token; close one of them"};
   }
   if (taken.all + reserved >= limits_.all) {
     return Refusal{1013, "full: " + std::to_string(taken.all) + " of " + std::to_string(limits_.all) +
-                             " connections" + (reserved > 0 ? ", the rest is for operators" : "")};
+                             " connections" +
+                             (reserved > 0 ? ", the remaining ones are reserved for operators" : "")};
   }
   ++taken.by_token[who.token_id];
   ++taken.all;

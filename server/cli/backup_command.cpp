@@ -34,8 +34,7 @@ std::optional<int> through_server(const Options& options) {
   auto client = server::HttpClient::to(*url, std::chrono::seconds(620));
   if (!client || !client.value().call("GET", "/healthz")) return std::nullopt;  // an address left by a crash
   if (!options.dir.empty())
-    return fail(
-        "a server has this folder open and keeps its backups where its backup.dir says; leave --dir out", 2);
+    return fail("a running server uses this folder and stores its backups in its backup.dir; omit --dir", 2);
   if (const auto token = own_token(options.data_dir); !token.empty())
     client.value().set_header("Authorization", "Bearer " + token);
   client.value().set_header("Prefer", "wait=600");
@@ -77,14 +76,14 @@ int restore(const Options& options) {
     return fail(old.error().message, input ? 2 : 1);
   }
   std::printf("%s is now the database of %s\n", options.file.c_str(), options.data_dir.c_str());
-  if (old.value()) std::printf("what stood there is kept as %s\n", old.value()->c_str());
+  if (old.value()) std::printf("the previous database is kept as %s\n", old.value()->c_str());
   return 0;
 }
 
 }  // namespace
 
 void add_backup_command(CLI::App& app, int& exit_code) {
-  auto* command = app.add_subcommand("backup", "Copy the database while it is in use, or put a copy back");
+  auto* command = app.add_subcommand("backup", "Copy the database while it is in use, or restore a copy");
   command->require_subcommand(0, 1);
   const auto options = std::make_shared<Options>();
   const auto common = [&](CLI::App* sub) {
@@ -93,14 +92,15 @@ void add_backup_command(CLI::App& app, int& exit_code) {
     add_database_option(*sub, options->database);
   };
   common(command);
-  command->add_option("--dir", options->dir, "where to put it, when no server runs [DATA_DIR/backups]");
-  command->add_option("--keep", options->keep, "how many whole ones to keep there, at least 7")
+  command->add_option("--dir", options->dir,
+                      "folder for the backup when no server is running [DATA_DIR/backups]");
+  command->add_option("--keep", options->keep, "number of intact backups to keep there, at least 7")
       ->check(CLI::Range(1, 10'000));
   command->callback([&exit_code, options, command] {
     if (command->get_subcommands().empty()) exit_code = make(*options);
   });
-  auto* back = command->add_subcommand("restore",
-                                       "Put a backup in the place of the database; the server must not run");
+  auto* back =
+      command->add_subcommand("restore", "Replace the database by a backup; the server must not be running");
   common(back);
   back->add_option("file", options->file, "the backup")->required();
   back->callback([&exit_code, options] { exit_code = restore(*options); });

@@ -74,14 +74,15 @@ void add_campaign_command(CLI::App& app, int& exit_code) {
   auto* campaign = app.add_subcommand("campaign", "Measurement campaigns: ranges with ground truth");
   campaign->require_subcommand(1);
   auto a = std::make_shared<CampaignArguments>();
-  auto* command = campaign->add_subcommand(
-      "import",
-      "Read CSV, NDJSON or a .txt of one measurement a line, drop faults, write one CSV to train on");
-  command->add_option("file", a->file, "File, plain or gzipped")->required();
+  auto* command = campaign->add_subcommand("import",
+                                           "Read CSV, NDJSON or a .txt file of one measurement per line, "
+                                           "reject faults, write one CSV to train on");
+  command->add_option("file", a->file, "Input file, plain or gzipped")->required();
   command->add_option("--out", a->out, "CSV to write (default: standard output)");
   add_word(*command, "--format", a->format, api::k_campaign_format_words, "Of the file");
-  command->add_option("--site", a->site, "Name of the site, for files that name none");
-  command->add_option("--environment", a->environment, "Hall, office: what no split may divide");
+  command->add_option("--site", a->site, "Name of the site, for files that have none");
+  command->add_option("--environment", a->environment,
+                      "Environment, like hall or office: never divided between training and test");
   command->add_option("--material", a->material, "Of the obstacle");
   command->add_option("--distance-m", a->distance_m, "True distance")->check(CLI::PositiveNumber);
   auto* heading = command->add_option("--heading-deg", a->heading_deg, "Heading of the tag");

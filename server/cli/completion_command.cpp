@@ -126,14 +126,14 @@ std::string written(const CLI::Option& option) {
 }
 
 std::string man_page(const CLI::App& app) {
-  std::string out = ".TH ANCHORD 1 \"\" \"anchord " ANCHORD_VERSION
-                    "\" \"User Commands\"\n"
-                    ".SH NAME\nanchord \\- find where a building's UWB anchors are on the globe\n"
-                    ".SH SYNOPSIS\n.B anchord\n.I COMMAND\n[\\fIOPTIONS\\fR]\n"
-                    ".SH DESCRIPTION\nA server that finds the positions of ultra\\-wideband anchors from "
-                    "ranges and RTK fixes of a "
-                    "drone, with what prepares, simulates, solves and checks such flights.\n"
-                    ".SH COMMANDS\n";
+  std::string out =
+      ".TH ANCHORD 1 \"\" \"anchord " ANCHORD_VERSION
+      "\" \"User Commands\"\n"
+      ".SH NAME\nanchord \\- find where a building's UWB anchors are on the globe\n"
+      ".SH SYNOPSIS\n.B anchord\n.I COMMAND\n[\\fIOPTIONS\\fR]\n"
+      ".SH DESCRIPTION\nA server that finds the positions of ultra\\-wideband anchors from ranges and RTK "
+      "fixes of a drone, with commands that prepare, simulate, solve and check such flights.\n"
+      ".SH COMMANDS\n";
   each(app, "", [&](const std::string& path, const CLI::App& at) {
     if (path.empty()) return;
     out += ".SS anchord" + roff(path) + "\n" + roff(at.get_description()) + "\n";
@@ -146,7 +146,8 @@ std::string man_page(const CLI::App& app) {
   });
   return out +
          ".SH EXIT STATUS\n0: done; 1: failed; 2: input or arguments that cannot be used.\n"
-         ".SH ENVIRONMENT\n.TP\n.B ANCHORD_TOKEN\nAccess token of commands that ask a running server.\n"
+         ".SH ENVIRONMENT\n.TP\n.B ANCHORD_TOKEN\nAccess token for commands that send requests to a running "
+         "server.\n"
          ".TP\n.B ANCHORD_DATA_DIR\nFolder of the database.\n";
 }
 

@@ -24,14 +24,14 @@ Result<server::Config> loaded(const ConfigFlags& flags) {
 void add_config_command(CLI::App& app, int& exit_code) {
   auto* command = app.add_subcommand("config", "Check or show the settings");
   command->require_subcommand(1);
-  auto* check = command->add_subcommand("check", "Say what is wrong with file, environment and flags");
+  auto* check = command->add_subcommand("check", "Check the settings in file, environment and flags");
   const auto check_flags = add_config_flags(*check);
   check->callback([&exit_code, check_flags] {
     const auto config = loaded(*check_flags);
     exit_code = config ? 0 : 2;
-    if (config) std::puts("configuration is good");
+    if (config) std::puts("configuration is valid");
   });
-  auto* show = command->add_subcommand("show", "Print every setting, its value and where that comes from");
+  auto* show = command->add_subcommand("show", "Print every setting, its value and its origin");
   const auto show_flags = add_config_flags(*show);
   show->callback([&exit_code, show_flags] {
     const auto config = loaded(*show_flags);

@@ -58,9 +58,8 @@ std::shared_ptr<ConfigFlags> add_config_flags(CLI::App& command) {
 
 void add_database_option(CLI::App& command, std::string& address) {
   command
-      .add_option(
-          "--database", address,
-          "PostgreSQL that has the rows, like postgresql://user@host/name [SQLite in the data folder]")
+      .add_option("--database", address,
+                  "PostgreSQL database, like postgresql://user@host/name [SQLite in the data folder]")
       ->envname("ANCHORD_DATABASE");
 }
 

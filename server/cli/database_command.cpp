@@ -76,16 +76,17 @@ void add_database_command(CLI::App& app, int& exit_code) {
   command->require_subcommand(1);
   const auto options = std::make_shared<Options>();
   const char* place = "data folder, or postgresql://user@host/name";
-  auto* migrated = command->add_subcommand("migrate", "Bring a database to the newest version");
+  auto* migrated = command->add_subcommand("migrate", "Migrate a database to the newest version");
   migrated->add_option("database", options->from, place)->required();
   migrated->callback([&exit_code, options] { exit_code = migrate(*options); });
   auto* checked =
       command->add_subcommand("check", "Print rows and digest of each table, or compare two databases");
   checked->add_option("database", options->from, place)->required();
-  checked->add_option("other", options->to, "compare with this one");
+  checked->add_option("other", options->to, "database to compare with");
   checked->callback([&exit_code, options] { exit_code = check(*options); });
   auto* copied = command->add_subcommand(
-      "copy", "Copy all rows into an empty database and compare; given again, goes on where it was cut off");
+      "copy",
+      "Copy all rows into an empty database and compare; the same command resumes an interrupted copy");
   copied->add_option("from", options->from, place)->required();
   copied->add_option("to", options->to, place)->required();
   copied->callback([&exit_code, options] { exit_code = copy(*options); });

@@ -67,17 +67,19 @@ int check(const DatasetArguments& a) {
 }  // namespace
 
 void add_dataset_command(CLI::App& app, int& exit_code) {
-  auto* dataset = app.add_subcommand("dataset", "Freeze labelled rangings into a data set, and check one");
+  auto* dataset = app.add_subcommand("dataset", "Freeze labelled ranges into a data set, and check one");
   dataset->require_subcommand(1);
   auto a = std::make_shared<DatasetArguments>();
-  auto* built =
-      dataset->add_subcommand("build", "Aggregate, split by whole places, look for leaks, take the digest");
+  auto* built = dataset->add_subcommand(
+      "build", "Aggregate, split by whole places, check for leaks, compute the digest");
   add_data_options(*built, a->data);
   add_word(*built, "--aggregate", a->aggregate, api::k_aggregation_words,
            "none (single ranges, as flights have them), or mean or median of each "
            "measurement point: models of these are not for live ranges");
-  built->add_option("--hold-out", a->held_out, "Places for the final test")->delimiter(',');
-  built->add_option("--hold-out-share", a->held_out_share, "Or this share of the places, drawn by the seed")
+  built->add_option("--hold-out", a->held_out, "Places held out for the final test")->delimiter(',');
+  built
+      ->add_option("--hold-out-share", a->held_out_share,
+                   "Or the share of places to hold out, drawn with the seed")
       ->check(CLI::Range(0.0, 0.9));
   built->add_option("--seed", a->seed, "Seed of that draw")->capture_default_str();
   built->add_option("--campaign", a->campaign, "Name of the campaign (default: that of the file)");
@@ -86,8 +88,8 @@ void add_dataset_command(CLI::App& app, int& exit_code) {
       ->required();
   built->callback([a, &exit_code] { exit_code = build(*a); });
   auto* checked = dataset->add_subcommand("check", "Read a data set again: digest, split, leak report");
-  checked->add_option("file", a->file, "CSV of `anchord dataset build` or of the service")->required();
-  checked->add_option("--digest", a->digest, "Fail where the digest is another");
+  checked->add_option("file", a->file, "CSV of `anchord dataset build` or of a server")->required();
+  checked->add_option("--digest", a->digest, "Fail if the digest differs");
   checked->callback([a, &exit_code] { exit_code = check(*a); });
 }
 

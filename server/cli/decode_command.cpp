@@ -115,10 +115,11 @@ const char* why_nothing(const Found& found, bool any_frames, bool all_formats) {
   if (found.bytes == 0) return "the input is empty";
   if (found.utf16) return "the input is UTF-16 text: save it as UTF-8";
   if (any_frames)
-    return "no position among them: wanted are GGA, GNS or RMC (nmea), NAV-PVT (ubx), POS and STAT (erb), "
+    return "no position among them: positions are in GGA, GNS or RMC (nmea), NAV-PVT (ubx), POS and STAT "
+           "(erb), "
            "solution lines (llh), TPV with a time (gpsd)";
-  return all_formats ? "nothing in it is NMEA, UBX, ERB, LLH or gpsd JSON with a right checksum or form"
-                     : "nothing in it is of this format: --format auto looks for all";
+  return all_formats ? "it contains no NMEA, UBX, ERB, LLH or gpsd JSON with a valid checksum or form"
+                     : "it contains nothing of this format: --format auto accepts all formats";
 }
 
 void report(const gnss::Decoder& decoder, const Found& found, bool all_formats) {
@@ -134,21 +135,23 @@ void report(const gnss::Decoder& decoder, const Found& found, bool all_formats) 
     std::fprintf(stderr, "fix: %s\n", listed(found.by_fix, k_fix_words).c_str());
   }
   if (found.by_protocol.size() > 1) {
-    std::fprintf(stderr, "epochs in several formats (%s), often the same ones again: --format takes one\n",
+    std::fprintf(stderr,
+                 "epochs in several formats (%s), often the same epochs twice: select one with --format\n",
                  listed(found.by_protocol, gnss::k_protocol_words).c_str());
   }
   if (found.dateless > 0) {
-    std::fprintf(stderr, "%llu epochs without a date: no RMC or ZDA in the stream; give one with --date\n",
+    std::fprintf(stderr,
+                 "%llu epochs without a date: no RMC or ZDA in the stream; give the date with --date\n",
                  static_cast<unsigned long long>(found.dateless));
   }
   if (found.timeless > 0) {
-    std::fprintf(stderr, "%llu epochs without a time: the receiver did not know it\n",
+    std::fprintf(stderr, "%llu epochs without a time: the receiver had no time yet\n",
                  static_cast<unsigned long long>(found.timeless));
   }
   if (decoder.llh_time_assumed() > 0) {
     std::fprintf(stderr,
-                 "llh: %llu lines before any header that names the time system, read as --llh-time says (utc "
-                 "unless given); RTKLIB itself writes gpst, 18 s ahead of it\n",
+                 "llh: %llu lines before any header that names the time system, read with --llh-time "
+                 "(default utc); RTKLIB writes gpst, which is 18 s ahead of utc\n",
                  static_cast<unsigned long long>(decoder.llh_time_assumed()));
   }
   for (const auto& [reason, entry] : decoder.skips().entries()) {
@@ -250,7 +253,7 @@ int run(const Decode& options) {
   write();
   report(decoder, found, !decoder_options_given->only);
   if (input.error() != 0)
-    std::fprintf(stderr, "anchord decode: reading %s broke off: %s\n", options.file.c_str(),
+    std::fprintf(stderr, "anchord decode: reading of %s failed: %s\n", options.file.c_str(),
                  std::strerror(input.error()));
   const bool unwritten = std::fflush(stdout) != 0 || std::ferror(stdout) != 0;
   if (unwritten) std::fprintf(stderr, "anchord decode: cannot write the output\n");
@@ -267,7 +270,7 @@ void add_decode_command(CLI::App& app, int& exit_code) {
   command->add_option("FILE", options->file, "log, - for standard input")->required();
   auto formats = words_of(gnss::k_protocol_words);
   formats.emplace_back("auto");
-  command->add_option("--format", options->format, "auto takes every format the stream holds")
+  command->add_option("--format", options->format, "auto accepts every format in the stream")
       ->check(CLI::IsMember(formats));
   add_word(*command, "--gst", options->gst, gnss::nmea::k_gst_order_words,
            "NMEA GST sigmas: the larger of latitude and longitude for both (some receivers swap them), or "

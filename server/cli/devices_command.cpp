@@ -34,8 +34,8 @@ class Server {
   static Result<Server> of(const Options& options) {
     const auto url = options.url.empty() ? running_server(options.data_dir) : std::optional(options.url);
     if (!url) {
-      return make_error(Errc::not_found,
-                        "no server runs in " + options.data_dir + ": start anchord serve, or say --url");
+      return make_error(Errc::not_found, "no server is running on the data folder " + options.data_dir +
+                                             ": start anchord serve, or give --url");
     }
     // A discovery listens for seconds, an action may wait for its device.
     BOOST_OUTCOME_TRY(auto client, server::HttpClient::to(*url, std::chrono::seconds(30)));
@@ -84,7 +84,8 @@ Result<Ordered> find(Server& server, const std::string& word) {
     if (text(device, "id").starts_with(word) || text(device, "name") == word) hits.push_back(device);
   }
   if (hits.empty()) return make_error(Errc::not_found, "there is no device \"" + word + "\"");
-  if (hits.size() > 1) return make_error(Errc::conflict, "\"" + word + "\" is several devices: use the id");
+  if (hits.size() > 1)
+    return make_error(Errc::conflict, "\"" + word + "\" matches several devices: use the id");
   return hits.front();
 }
 
@@ -114,16 +115,17 @@ int show(const Options& options, const Result<Ordered>& list, const char* none,
 }
 
 int list(const Options& options, Server& server) {
-  return show(options, configured(server), "none is set up: anchord devices discover, then add",
-              print_device);
+  return show(options, configured(server),
+              "no device is set up: run anchord devices discover, then anchord devices add", print_device);
 }
 
 int discover(const Options& options, Server& server) {
   server.header("Prefer", "wait=20");
   auto found = server.call("POST", "/api/v1/discovery", "{}");
   if (!found) return fail(found.error().message);
-  if (!found.value().contains("items")) return fail("the discovery takes longer than 20 s: ask again");
-  const char* none = "no serial port that is not in use; a device of the network is added by its address";
+  if (!found.value().contains("items"))
+    return fail("the discovery takes longer than 20 s: run the command again");
+  const char* none = "no unused serial port was found; a network device is added by its address";
   return show(options, found.value()["items"], none, [](const Ordered& d) {
     const auto kind = text(d, "kind");
     std::printf("%-6s %s\n    %s\n", kind.empty() ? "?" : kind.c_str(), text(d, "address").c_str(),
@@ -214,7 +216,7 @@ int act(const Options& options, Server& server) {
   Ordered body{{"action", options.action}};
   if (!options.arguments.empty()) {
     body["arguments"] = Ordered::parse(options.arguments, nullptr, false);
-    if (!body["arguments"].is_object()) return fail("--arguments is a JSON object", 2);
+    if (!body["arguments"].is_object()) return fail("--arguments must be a JSON object", 2);
   }
   const auto done =
       server.call("POST", "/api/v1/devices/" + text(device.value(), "id") + "/actions", to_wire(body));
@@ -228,11 +230,11 @@ int act(const Options& options, Server& server) {
 void add_devices_command(CLI::App& app, int& exit_code) {
   auto* command = app.add_subcommand("devices", "Tags, rovers and correction services of a running server");
   auto options = std::make_shared<Options>();
-  command->add_option("--data-dir", options->data_dir, "Folder of the server")
+  command->add_option("--data-dir", options->data_dir, "Data folder of the server")
       ->capture_default_str()
       ->envname("ANCHORD_DATA_DIR");
-  command->add_option("--url", options->url, "Another server");
-  command->add_flag("--json", options->json, "As the server gives it");
+  command->add_option("--url", options->url, "URL of another server");
+  command->add_flag("--json", options->json, "Print JSON as the server sends it");
   command->require_subcommand(0, 1);
   command->fallthrough();
   const auto run = [options, &exit_code](int (*what)(const Options&, Server&)) {
@@ -240,27 +242,27 @@ void add_devices_command(CLI::App& app, int& exit_code) {
     exit_code = server ? what(*options, server.value()) : fail(server.error().message);
   };
   command->add_subcommand("list", "Configured devices and their state")->callback([run] { run(list); });
-  command->add_subcommand("discover", "Listen at every port that is not in use")->callback([run] {
+  command->add_subcommand("discover", "Listen on every port that is not in use")->callback([run] {
     run(discover);
   });
-  auto* made = command->add_subcommand("add", "Set a device up");
+  auto* made = command->add_subcommand("add", "Set up a device");
   made->add_option("kind", options->kind, "gnss, pozyx, ntrip, mqtt, ndjson or dwm1001")->required();
   made->add_option("address", options->address, "serial:/dev/serial/by-id/..., tcp://host:port, ...")
       ->required();
   made->add_option("settings", options->settings,
                    "key=value, e.g. format=ubx, mount=RTCM3, mapping_file=tags.toml");
-  made->add_option("--name", options->name, "For people");
+  made->add_option("--name", options->name, "Name of the device, shown in the dashboard");
   made->callback([run] { run(add); });
   auto* set =
       command->add_subcommand("settings", "Show a device, or change it: name=..., enabled=false, format=ubx");
   set->add_option("device", options->device, "Id, the beginning of it, or name")->required();
   set->add_option("changes", options->settings, "key=value");
   set->callback([run] { run(settings); });
-  auto* gone = command->add_subcommand("remove", "Forget a device");
+  auto* gone = command->add_subcommand("remove", "Remove a device");
   gone->add_option("device", options->device, "Id, the beginning of it, or name")->required();
   gone->callback([run] { run(remove); });
   auto* identify =
-      command->add_subcommand("identify", "Let the lights of a tag blink, or of an anchor in its reach");
+      command->add_subcommand("identify", "Blink the lights of a tag, or of an anchor in its range");
   identify->add_option("device", options->device, "Id, the beginning of it, or name")->required();
   identify->add_option("anchor", options->anchor, "Network id of an anchor, e.g. 0x6a21");
   identify->callback([run, options] {
@@ -268,7 +270,7 @@ void add_devices_command(CLI::App& app, int& exit_code) {
     if (!options->anchor.empty()) options->arguments = to_wire(Ordered{{"network_id", options->anchor}});
     run(act);
   });
-  auto* action = command->add_subcommand("action", "Anything else a device can be asked");
+  auto* action = command->add_subcommand("action", "Send another command to a device");
   action->add_option("device", options->device, "Id, the beginning of it, or name")->required();
   action->add_option("action", options->action, "get_uwb, set_uwb, push_positions, range_between, ...")
       ->required();

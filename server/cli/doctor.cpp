@@ -57,10 +57,10 @@ Finding folder(const fs::path& dir) {
   std::error_code error;
   if (!fs::exists(dir, error))
     return {Level::warning, "data folder", fs::absolute(dir).string() + ": does not exist",
-            "the first 'anchord serve --data-dir " + dir.string() + "' makes it"};
+            "it is created by the first 'anchord serve --data-dir " + dir.string() + "' makes it"};
   if (!fs::is_directory(dir, error))
-    return {Level::failed, "data folder", dir.string() + ": is no folder",
-            "name another one with --data-dir"};
+    return {Level::failed, "data folder", dir.string() + ": is not a folder",
+            "give another one with --data-dir"};
   if (::access(dir.c_str(), R_OK | W_OK | X_OK) != 0)
     return {Level::failed, "data folder", dir.string() + ": " + std::strerror(errno),
             "run anchord as the owner of the folder, or give it to the user who runs it (chown)"};
@@ -71,14 +71,15 @@ Finding disk(const fs::path& dir) {
   const fs::path at = fs::exists(dir) ? dir : fs::absolute(dir).parent_path();
   struct statvfs space {};
   if (::statvfs(at.c_str(), &space) != 0)
-    return {Level::warning, "disk", at.string() + ": " + std::strerror(errno), "look at the file system"};
+    return {Level::warning, "disk", at.string() + ": " + std::strerror(errno), "check the file system"};
   const double free_gb = static_cast<double>(space.f_bavail) * static_cast<double>(space.f_frsize) / k_gb;
   const std::string seen = number(free_gb) + " GB free";
   if (free_gb < k_least_free_gb)
     return {Level::failed, "disk", seen + ", a flight needs " + number(k_least_free_gb, 0) + " GB",
             "delete what is not needed, or move the data folder"};
   if (free_gb < k_wanted_free_gb)
-    return {Level::warning, "disk", seen, "below " + number(k_wanted_free_gb, 0) + " GB: make room soon"};
+    return {Level::warning, "disk", seen,
+            "below " + number(k_wanted_free_gb, 0) + " GB: free some space soon"};
   return {Level::ok, "disk", seen};
 }
 
@@ -97,8 +98,8 @@ std::optional<Finding> database(const fs::path& dir) {
                      "install the version that wrote it"};
     if (const auto found = connection.check(false); found != "ok")
       return Finding{Level::failed, "database", size + ", damaged: " + found,
-                     "stop, copy the folder, then 'anchord backup restore FILE'"};
-    return Finding{Level::ok, "database", size + ", version " + std::to_string(version) + ", whole"};
+                     "stop anchord, copy the folder, then 'anchord backup restore FILE'"};
+    return Finding{Level::ok, "database", size + ", version " + std::to_string(version) + ", intact"};
   } catch (const sql::SqlError& failure) {
     return Finding{Level::failed, "database", size + ", " + failure.what(),
                    "run as the owner of the folder; if it is damaged: 'anchord backup restore FILE'"};
@@ -129,10 +130,11 @@ std::vector<Finding> workers_of(const std::string& address) {
   std::vector<Finding> out;
   for (const auto& w : found.value()) {
     std::string seen = w.name + ", anchord " + w.version + ", ";
-    seen += w.job ? "works on job " + to_string(*w.job) : "waits for jobs";
+    seen += w.job ? "running job " + to_string(*w.job) : "waiting for jobs";
     if (w.seen_s_ago > k_worker_silent_s)
-      out.push_back({Level::warning, "worker", seen + ", not seen for " + number(w.seen_s_ago, 0) + " s",
-                     "look whether it still runs; its job is taken over by another worker or the server"});
+      out.push_back(
+          {Level::warning, "worker", seen + ", not seen for " + number(w.seen_s_ago, 0) + " s",
+           "check whether it is still running; its job is taken over by another worker or the server"});
     else if (w.version != ANCHORD_VERSION)
       out.push_back({Level::warning, "worker", seen, "it claims only jobs of a server of its own version"});
     else
@@ -146,8 +148,8 @@ std::vector<Finding> workers_of(const std::string& address) {
 std::optional<Finding> rows_elsewhere(const fs::path& dir) {
   const auto there = sql::postgres_of_folder(dir);
   if (there.empty()) return std::nullopt;
-  return Finding{Level::warning, "database", "the rows of this folder are in " + there,
-                 "name it with --database"};
+  return Finding{Level::warning, "database", "the database of this folder is " + there,
+                 "give it with --database"};
 }
 
 /// Whether the certificate can be served, and for how long.
@@ -167,8 +169,8 @@ std::optional<Finding> certificate(const DoctorOptions& options) {
 /// Whether a server could listen there now.
 Finding port(std::string address) {
   if (const auto scheme = address.find("://"); scheme != std::string::npos) address.erase(0, scheme + 3);
-  const Finding unreadable{Level::warning, "port", address + ": not looked at",
-                           "only IPv4 addresses with a port are tried"};
+  const Finding unreadable{Level::warning, "port", address + ": not checked",
+                           "only IPv4 addresses with a port can be checked"};
   const auto colon = address.rfind(':');
   if (colon == std::string::npos) return unreadable;
   sockaddr_in at{};
@@ -183,8 +185,9 @@ Finding port(std::string address) {
   if (fd >= 0) ::close(fd);
   if (bound) return {Level::ok, "port", address + " is free"};
   return {Level::failed, "port", address + ": " + std::strerror(why),
-          why == EADDRINUSE ? "another program listens there (ss -ltnp): end it, or serve with --listen"
-                            : "serve with --listen of an address of this machine"};
+          why == EADDRINUSE
+              ? "another program uses this port (ss -ltnp): end it, or give another one with --listen"
+              : "give an address of this machine with --listen"};
 }
 
 Finding clock_set() {
@@ -193,7 +196,7 @@ Finding clock_set() {
   const auto now = SystemClock{}.now();
   const std::string seen = to_rfc3339(now);
   if (now.ns < 1'735'689'600'000'000'000)  // 2025
-    return {Level::failed, "clock", seen, "set the clock: measurements are joined and kept by it"};
+    return {Level::failed, "clock", seen, "set the clock: measurements are matched and stored by it"};
   if (answer < 0 || answer == TIME_ERROR || (state.status & STA_UNSYNC) != 0)
     return {
         Level::warning, "clock", seen + ", not synchronised",
@@ -224,7 +227,7 @@ std::vector<Finding> serial_devices() {
       out.push_back({Level::failed, "serial device", one.path + ": " + std::strerror(errno),
                      "sudo usermod -aG dialout $USER, then log in again"});
   }
-  if (out.empty()) out.push_back({Level::ok, "serial devices", "none plugged in"});
+  if (out.empty()) out.push_back({Level::ok, "serial devices", "none connected"});
   return out;
 }
 

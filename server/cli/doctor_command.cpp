@@ -32,13 +32,13 @@ std::string findings_json(const std::vector<Finding>& findings) {
 
 void add_doctor_command(CLI::App& app, int& exit_code) {
   auto* command = app.add_subcommand(
-      "doctor", "Look at what a server needs: folder, disk, database, port, clock, devices; says what to do");
+      "doctor", "Check what a server needs: folder, disk, database, port, clock, devices; says what to do");
   const auto options = std::make_shared<DoctorOptions>();
   const auto json = std::make_shared<bool>(false);
   command->add_option("--data-dir", options->data_dir, "folder of the database [anchord-data]")
       ->envname("ANCHORD_DATA_DIR");
   add_database_option(*command, options->database);
-  command->add_option("--listen", options->listen, "where a server would listen [127.0.0.1:8420]")
+  command->add_option("--listen", options->listen, "address on which a server would listen [127.0.0.1:8420]")
       ->envname("ANCHORD_LISTEN");
   command->add_option("--tls-certificate", options->tls_certificate, "PEM file of the server's certificate")
       ->envname("ANCHORD_TLS_CERTIFICATE");

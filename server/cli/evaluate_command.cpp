@@ -49,7 +49,8 @@ int evaluate(const EvaluateArguments& a) {
   if (!gathered) return refuse("evaluate", gathered.error().message);
   auto& [data, report] = gathered.value();
   const auto evaluation = ml::evaluate(model.value(), data);
-  if (evaluation.rows == 0) return refuse("evaluate", a.data.files.front() + ": no row of the model's class");
+  if (evaluation.rows == 0)
+    return refuse("evaluate", a.data.files.front() + ": no row with the class of the model");
   report.used = evaluation.rows;
   const auto out = a.json ? api::evaluation_json(evaluation, model.value(), report)
                           : api::evaluation_text(evaluation, model.value(), report);
@@ -60,13 +61,13 @@ int evaluate(const EvaluateArguments& a) {
 }  // namespace
 
 void add_evaluate_command(CLI::App& app, int& exit_code) {
-  auto* command = app.add_subcommand("evaluate", "Measure a trained model on a table of labelled rangings");
+  auto* command = app.add_subcommand("evaluate", "Evaluate a trained model on a table of labelled ranges");
   auto a = std::make_shared<EvaluateArguments>();
   add_data_options(*command, a->data);
   command->add_option("--model", a->model, "Model artifact of `anchord train`")->required();
   command
       ->add_option("--threshold", a->threshold,
-                   "P(LOS) from which a ranging is called LOS (default: the model's)")
+                   "P(LOS) from which a range is classified as LOS (default: that of the model)")
       ->check(CLI::Range(0.0, 1.0));
   command->add_flag("--json", a->json, "One JSON document on standard output");
   command->callback([a, &exit_code] { exit_code = evaluate(*a); });

@@ -73,17 +73,17 @@ struct Setting {
   Result<void> (*read)(const std::string& text, ForeignOptions& out);
 };
 constexpr std::array k_settings{
-    Setting{"tag", "Radio address of the tag, where no column has it",
+    Setting{"tag", "Radio address of the tag, if no column has it",
             [](const std::string& text, ForeignOptions& out) -> Result<void> {
               out.tag = text;
               return boost::outcome_v2::success();
             }},
-    Setting{"kit", "Name of the kit: its flights learn from each other",
+    Setting{"kit", "Name of the kit: its flights share one calibration of the range bias",
             [](const std::string& text, ForeignOptions& out) -> Result<void> {
               out.kit = text;
               return boost::outcome_v2::success();
             }},
-    Setting{"point", "What the track is of: gnss_antenna (default), body, tag_antenna",
+    Setting{"point", "Point that the track gives: gnss_antenna (default), body, tag_antenna",
             [](const std::string& text, ForeignOptions& out) -> Result<void> {
               std::optional<TrackPoint> point;
               BOOST_OUTCOME_TRYV(word(text, k_point_words, point));
@@ -91,9 +91,9 @@ constexpr std::array k_settings{
               return boost::outcome_v2::success();
             }},
     Setting{
-        "lever-arm", "From there to the tag in metres: forward,left,up",
+        "lever-arm", "From that point to the tag in metres: forward,left,up",
         [](const std::string& text, ForeignOptions& out) { return read_arm(text, out.lever_arm_body_m); }},
-    Setting{"lever-arm-sigma", "How well that was measured, one sigma in metres",
+    Setting{"lever-arm-sigma", "One sigma of that measurement in metres",
             [](const std::string& text, ForeignOptions& out) -> Result<void> {
               BOOST_OUTCOME_TRY(out.lever_arm_sigma_m, number(text));
               if (is_lever_arm_sigma(*out.lever_arm_sigma_m)) return boost::outcome_v2::success();
@@ -109,7 +109,7 @@ constexpr std::array k_settings{
             [](const std::string& text, ForeignOptions& out) {
               return read_time(text, out.track_time_unit, out.track_time_scale);
             }},
-    Setting{"range-time", "The same of the ranges",
+    Setting{"range-time", "Times of the ranges, as --track-time",
             [](const std::string& text, ForeignOptions& out) {
               return read_time(text, out.range_time_unit, out.range_time_scale);
             }},
@@ -121,7 +121,7 @@ constexpr std::array k_settings{
             [](const std::string& text, ForeignOptions& out) {
               return word(text, api::k_length_unit_words, out.height_unit);
             }},
-    Setting{"fix-numbers", "What the numbers of the fix class mean: solution, nmea, rtklib, mavlink",
+    Setting{"fix-numbers", "Meaning of the numbers of the fix class: solution, nmea, rtklib, mavlink",
             [](const std::string& text, ForeignOptions& out) {
               return word(text, api::k_fix_numbers_words, out.fix_numbers);
             }},
@@ -130,17 +130,17 @@ constexpr std::array k_settings{
               out.crs = text;
               return boost::outcome_v2::success();
             }},
-    Setting{
-        "heights",
-        "What heights are above: ellipsoidal, EPSG:5773 (mean sea level, EGM96) or another vertical system, "
-        "metres of the geoid there, or column",
-        [](const std::string& text, ForeignOptions& out) -> Result<void> {
-          out.heights = text;
-          SourceCrsSpec checked;
-          if (text == "column") return boost::outcome_v2::success();
-          return read_heights(text, checked);
-        }},
-    Setting{"max-datum-error", "Largest error of a change of datum that is accepted, in metres; default 0.5",
+    Setting{"heights",
+            "Reference of the heights: ellipsoidal, EPSG:5773 (mean sea level, EGM96) or another vertical "
+            "system, "
+            "metres of the geoid there, or column",
+            [](const std::string& text, ForeignOptions& out) -> Result<void> {
+              out.heights = text;
+              SourceCrsSpec checked;
+              if (text == "column") return boost::outcome_v2::success();
+              return read_heights(text, checked);
+            }},
+    Setting{"max-datum-error", "Largest accepted error of a datum transformation, in metres; default 0.5",
             [](const std::string& text, ForeignOptions& out) -> Result<void> {
               BOOST_OUTCOME_TRY(out.max_datum_error_m, number(text));
               return boost::outcome_v2::success();
@@ -265,14 +265,16 @@ std::string ForeignSource::name() const {
 void add_foreign_source(CLI::App& command, ForeignSource& source) {
   command.add_option(
       "--track", source.track,
-      "In place of a flight folder: the track as another program wrote it, CSV, .pos of RTKLIB or a log "
+      "Instead of a flight folder: the track as another program wrote it, CSV, .pos of RTKLIB or a log "
       "of NMEA or UBX (docs/formats.md)");
   command.add_option("--ranges", source.ranges,
                      "The ranges as another program wrote them, CSV; without --track each has a pose");
-  command.add_option("--mapping", source.mapping, "JSON: names of columns and the options below");
-  command.add_option("--column", source.columns, "track.FIELD=NAME or ranges.FIELD=NAME: what a column is");
+  command.add_option("--mapping", source.mapping,
+                     "JSON file with the names of columns and the options below");
+  command.add_option("--column", source.columns,
+                     "track.FIELD=NAME or ranges.FIELD=NAME: meaning of a column");
   command.add_flag("--column-for-each-anchor", source.column_for_each_anchor,
-                   "Columns of ranges are named by their anchors");
+                   "There is one column of ranges for each anchor, named by the anchor");
   for (const auto& setting : k_settings) {
     const std::string option = std::string("--") + setting.name;
     if (command.get_option_no_throw(option) != nullptr) continue;

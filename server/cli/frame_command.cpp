@@ -56,7 +56,8 @@ Result<Pairs> read_pairs(const std::filesystem::path& file) {
       BOOST_OUTCOME_TRY(pair.local_m[static_cast<Eigen::Index>(i)], table.number(local[i]));
       BOOST_OUTCOME_TRY(at[static_cast<Eigen::Index>(i)], table.number(there[i]));
     }
-    if (!at.allFinite() || (globe && std::abs(at.y()) > 90)) return table.error("no place on the globe");
+    if (!at.allFinite() || (globe && std::abs(at.y()) > 90))
+      return table.error("not a position on the globe");
     if (globe) {
       const Wgs84 place{at.y(), at.x(), at.z()};
       if (!out.origin) out.origin = place;
@@ -86,7 +87,7 @@ void print(const Pairs& pairs, const FrameFit& fit) {
                 std::sqrt((*fit.covariance)(0, 0)), std::sqrt((*fit.covariance)(1, 1)),
                 std::sqrt((*fit.covariance)(2, 2)), std::sqrt((*fit.covariance)(5, 5)) * 57.29577951308232,
                 std::sqrt((*fit.covariance)(6, 6)) * 1e6);
-  std::printf("%-16s %9s %9s %9s   from where the others put it\n", "pair", "de m", "dn m", "du m");
+  std::printf("%-16s %9s %9s %9s   from where the other pairs place it\n", "pair", "de m", "dn m", "du m");
   for (std::size_t i = 0; i < pairs.pairs.size(); ++i) {
     const auto& r = fit.residuals[i];
     const std::string name = pairs.pairs[i].name.empty() ? std::to_string(i + 1) : pairs.pairs[i].name;
@@ -129,9 +130,11 @@ int fit_command(const Arguments& a) {
 }  // namespace
 
 void add_frame_command(CLI::App& app, int& exit_code) {
-  auto* command = app.add_subcommand("frame", "Local frames of positioning systems on the globe");
+  auto* command =
+      app.add_subcommand("frame", "Transforms between local frames of positioning systems and the globe");
   command->require_subcommand(1);
-  auto* fit = command->add_subcommand("fit", "Fit the transform from local to global coordinates to pairs");
+  auto* fit = command->add_subcommand(
+      "fit", "Fit the transform from local to global coordinates from pairs of points");
   auto a = std::make_shared<Arguments>();
   fit->add_option(
          "pairs", a->pairs,
@@ -139,8 +142,8 @@ void add_frame_command(CLI::App& app, int& exit_code) {
       ->required();
   fit->add_option("--parameters", a->parameters, "4: plane similarity and height shift; 7: Helmert")
       ->check(CLI::IsMember({4, 7}));
-  fit->add_flag("--fixed-scale", a->fixed_scale, "Metres of the local frame are metres");
-  fit->add_flag("--json", a->json, "The transform as JSON");
+  fit->add_flag("--fixed-scale", a->fixed_scale, "Fix the scale to 1");
+  fit->add_flag("--json", a->json, "Print the transform as JSON");
   fit->callback([a, &exit_code] { exit_code = fit_command(*a); });
 }
 

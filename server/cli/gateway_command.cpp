@@ -85,8 +85,7 @@ void print_status(const Json& s) {
   std::snprintf(buffer, sizeof buffer, "%.0f rows, %.1f of %.0f MiB", number(outbox, "rows"),
                 number(outbox, "bytes") / (1 << 20), number(outbox, "max_bytes") / (1 << 20));
   line("waiting", buffer);
-  std::snprintf(buffer, sizeof buffer,
-                "%.0f kept, %.0f accepted, %.0f known already, %.0f rejected, %.0f lost",
+  std::snprintf(buffer, sizeof buffer, "%.0f kept, %.0f accepted, %.0f duplicates, %.0f rejected, %.0f lost",
                 number(rows, "kept"), number(rows, "accepted"), number(rows, "duplicates"),
                 number(rows, "rejected"), number(rows, "lost"));
   line("rows", buffer);
@@ -108,8 +107,8 @@ void print_status(const Json& s) {
 int status(const Options& options) {
   const auto url = running_server(options.data_dir);
   if (!url)
-    return fail("no gateway runs in " + options.data_dir +
-                    ": start 'anchord gateway --to URL', or name its --data-dir",
+    return fail("no gateway is running on the data folder " + options.data_dir +
+                    ": start 'anchord gateway --to URL', or give its --data-dir",
                 1);
   auto client = server::HttpClient::to(*url, std::chrono::seconds(5));
   if (!client) return fail(client.error().message, 1);
@@ -117,7 +116,7 @@ int status(const Options& options) {
   if (!answer) return fail(answer.error().message, 1);
   const auto json = Json::parse(answer.value().body, nullptr, false);
   if (answer.value().status != 200 || !json.is_object() || !json.contains("outbox"))
-    return fail(*url + " is no gateway: name the gateway's --data-dir", 1);
+    return fail(*url + " is not a gateway: give the --data-dir of the gateway", 1);
   if (options.json)
     std::printf("%s\n", answer.value().body.c_str());
   else
@@ -136,28 +135,29 @@ void add_gateway_command(CLI::App& app, int& exit_code) {
   command->add_option("--to", o.gateway.to, "address of the server, like http://192.168.1.10:8420")
       ->envname("ANCHORD_GATEWAY_TO");
   command
-      ->add_option(
-          "--token-file", o.token_file,
-          "file with an access token of the server (roles gateway and viewer); read again when refused")
+      ->add_option("--token-file", o.token_file,
+                   "file with an access token of the server (roles gateway and viewer); read again when it "
+                   "is rejected")
       ->envname("ANCHORD_GATEWAY_TOKEN_FILE");
   command
       ->add_option("--data-dir", o.data_dir,
                    "folder of outbox, recordings and devices.json [anchord-gateway]")
       ->envname("ANCHORD_GATEWAY_DATA_DIR");
   command
-      ->add_option(
-          "--device", o.gateway.devices,
-          "kind=address, like gnss=serial:/dev/ttyACM0; may be repeated; beside those of devices.json")
+      ->add_option("--device", o.gateway.devices,
+                   "kind=address, like gnss=serial:/dev/ttyACM0; may be repeated; in addition to those of "
+                   "devices.json")
       ->allow_extra_args(false);
-  command->add_option(
-      "--mission", o.mission,
-      "id of the mission that rows belong to, also those kept without one [the one that has the "
-      "server's devices]");
-  command->add_option("--max-mib", o.max_mib, "size of the outbox; full, it keeps what it has [4096]")
+  command->add_option("--mission", o.mission,
+                      "id of the mission that the rows belong to, also those stored without one [the mission "
+                      "that has the server's devices]");
+  command
+      ->add_option("--max-mib", o.max_mib,
+                   "largest size of the outbox in MiB; when it is full, no new rows are added [4096]")
       ->check(CLI::Range(1, 1 << 20));
   command
       ->add_option("--recordings-max-mib", o.recordings_max_mib,
-                   "size of the raw recordings; beyond it the oldest go [8192]")
+                   "largest size of the raw recordings in MiB; beyond it the oldest are deleted [8192]")
       ->check(CLI::Range(1, 1 << 20));
   command->add_option("--listen", o.gateway.listen,
                       "loopback address of /status, /healthz, /readyz and /metrics [127.0.0.1:8421]");
@@ -166,8 +166,8 @@ void add_gateway_command(CLI::App& app, int& exit_code) {
   command->require_subcommand(0, 1);
   command->fallthrough();
   auto* shown = command->add_subcommand(
-      "status", "Show a running gateway (exit code 1: not running, or an alarm stands)");
-  shown->add_flag("--json", o.json, "as the gateway gives it");
+      "status", "Show a running gateway (exit code 1: not running, or an alarm is active)");
+  shown->add_flag("--json", o.json, "print JSON as the gateway sends it");
   shown->callback([&exit_code, options] { exit_code = status(*options); });
   command->callback([&exit_code, options, command] {
     if (command->get_subcommands().empty()) exit_code = run(*options);

@@ -9,11 +9,11 @@
 namespace anchord::cli {
 
 void add_healthcheck_command(CLI::App& app, int& exit_code) {
-  auto* command =
-      app.add_subcommand("healthcheck", "Ask a running server whether it is ready (exit code 0 or 1)");
+  auto* command = app.add_subcommand("healthcheck",
+                                     "Check whether a running server is ready (exit code 0: ready, 1: not)");
   const auto url = std::make_shared<std::string>();
   const auto data_dir = std::make_shared<std::string>("anchord-data");
-  command->add_option("--url", *url, "address of the server; else that of the data folder's server");
+  command->add_option("--url", *url, "address of the server [the server of the data folder]");
   command->add_option("--data-dir", *data_dir, "folder of the database [anchord-data]")
       ->envname("ANCHORD_DATA_DIR");
   command->callback([&exit_code, url, data_dir] {

@@ -111,8 +111,7 @@ Result<std::string> import_into_folder(const Options& options, FlightData flight
 
 Result<FlightData> read_flight(const Options& options) {
   if (options.folder.empty() == !options.foreign.given())
-    return make_error(Errc::invalid_argument,
-                      "a flight folder is needed, or --track and --ranges, and not both");
+    return make_error(Errc::invalid_argument, "give either a flight folder, or --track and --ranges");
   if (!options.foreign.given()) return read_flight_folder(options.folder);
   BOOST_OUTCOME_TRY(auto flight, read_foreign_source(options.foreign));
   return flight;
@@ -139,10 +138,10 @@ int import_flight(const Options& options) {
 }  // namespace
 
 void add_import_command(CLI::App& app, int& exit_code) {
-  auto* command = app.add_subcommand("import", "Bring measurements in from files");
+  auto* command = app.add_subcommand("import", "Import measurements from files");
   command->require_subcommand(1);
-  auto* flight =
-      command->add_subcommand("flight", "One flight folder as a finished mission; prints the mission's id");
+  auto* flight = command->add_subcommand(
+      "flight", "Import a flight folder as a finished mission; prints the id of the mission");
   auto options = std::make_shared<Options>();
   options->url = "http://127.0.0.1:8420";
   flight->add_option("folder", options->folder,
@@ -150,11 +149,11 @@ void add_import_command(CLI::App& app, int& exit_code) {
   auto* url = flight->add_option("--url", options->url, "Running server")->capture_default_str();
   flight
       ->add_option("--data-dir", options->data_dir,
-                   "Straight into the data folder of a server that is not running")
+                   "Write directly into the data folder of a server that is not running")
       ->excludes(url);
   add_database_option(*flight, options->database);
   flight->add_option("--token-file", options->token_file, "File with an access token (gateway and operator)");
-  flight->add_option("--name", options->name, "Name of the mission; else that of the folder");
+  flight->add_option("--name", options->name, "Name of the mission [name of the folder]");
   add_foreign_source(*flight, options->foreign);
   flight->callback([options, &exit_code] { exit_code = import_flight(*options); });
 }

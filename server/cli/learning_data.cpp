@@ -15,17 +15,20 @@ namespace anchord::cli {
 void add_data_options(CLI::App& command, DataOptions& o) {
   command
       .add_option("--data", o.files,
-                  "CSV of one ranging a line, plain or gzipped; several files: each is a place")
+                  "CSV of one range per line, plain or gzipped; with several files, each is a place")
       ->required();
   command.add_option("--cir", o.cir, "CSV of CIR magnitudes m0, m1, ... joined by setup, idx or seq");
   command.add_option("--label", o.table.label, "Column of the class (default: nlos, los, label, cls)");
   command.add_option("--los-value", o.table.los_value, "Value of that column that means LOS");
-  command.add_option("--range", o.table.range, "Column of the measured range (default: range_m and its kin)");
+  command.add_option("--range", o.table.range,
+                     "Column of the measured range (default: range_m and similar names)");
   command.add_option("--truth", o.table.truth,
-                     "Column of the true range (default: true_range_m and its kin)");
-  command.add_option("--group-by", o.table.group_by, "Columns naming a place, which no split divides")
+                     "Column of the true range (default: true_range_m and similar names)");
+  command
+      .add_option("--group-by", o.table.group_by,
+                  "Columns that name a place; a place is never divided between training and test")
       ->delimiter(',');
-  command.add_option("--placement", o.table.placement, "Columns naming one placement of the devices")
+  command.add_option("--placement", o.table.placement, "Columns that name one placement of the devices")
       ->delimiter(',');
 }
 
@@ -94,7 +97,7 @@ Result<FrozenRows> rows_for(const DataOptions& o, const FrozenFile& file, ml::Ta
     const auto place = o.table.group_by.size() == 1 ? api::place_of(o.table.group_by.front()) : std::nullopt;
     if (!place)
       return make_error(Errc::invalid_argument,
-                        "--group-by of a frozen data set is environment, campaign or setting");
+                        "--group-by of a frozen data set must be environment, campaign or setting");
     wish.group_by = *place;
   }
   auto rows = api::learning_rows(file.table, wish);
@@ -140,7 +143,7 @@ Result<ml::Model> read_model_file(const std::string& path) {
   if (failed) return make_error(Errc::not_found, path + ": cannot be read");
   // Refused by its size before it is read: nothing hostile fills the memory.
   if (bytes > api::k_max_artifact_bytes)
-    return make_error(Errc::bad_frame, path + ": larger than any model artifact");
+    return make_error(Errc::bad_frame, path + ": larger than any model artifact can be");
   std::ifstream file(path, std::ios::binary);
   if (!file) return make_error(Errc::not_found, path + ": cannot be read");
   const std::string text(std::istreambuf_iterator<char>(file), {});

@@ -70,7 +70,7 @@ bool signature_words(const std::string& path, const ml::Model& model, const api:
   words = signature.empty() ? "not signed" : "signed, " + signature.substr(0, signature.rfind(':'));
   if (signature.empty() || signer == nullptr) return true;
   const auto standing = signer->standing(api::write_model_artifact(model), signature);
-  words = standing == api::ModelStanding::changed ? "EDITED after it was signed by this server"
+  words = standing == api::ModelStanding::changed ? "CHANGED after it was signed by this server"
           : standing == api::ModelStanding::foreign
               ? "signed by another server"
               : "signed by this server, " + std::string(to_string(standing));
@@ -103,15 +103,17 @@ void add_models_command(CLI::App& app, int& exit_code) {
   auto* models = app.add_subcommand("models", "List, show and check model artifacts of `anchord train`");
   models->require_subcommand(1);
   auto a = std::make_shared<ModelsArguments>();
-  auto* listed = models->add_subcommand("list", "Every model artifact of a folder");
+  auto* listed = models->add_subcommand("list", "List the model artifacts in a folder");
   listed->add_option("folder", a->folder, "Folder")->capture_default_str();
   listed->add_flag("--json", a->json, "One JSON document on standard output");
   listed->callback([a, &exit_code] { exit_code = list(*a); });
-  auto* shown = models->add_subcommand("show", "Manifest of artifacts: task, features, data, metrics, why");
+  auto* shown = models->add_subcommand(
+      "show", "Print the manifest of artifacts: task, features, data, metrics, reason for the choice");
   shown->add_option("files", a->files, "Artifacts")->required();
   shown->add_flag("--json", a->json, "One JSON document on standard output");
   shown->callback([a, &exit_code] { exit_code = show(*a); });
-  auto* checked = models->add_subcommand("check", "Read artifacts as a server would, and say what is wrong");
+  auto* checked =
+      models->add_subcommand("check", "Check artifacts as a server does, and print what is wrong");
   checked->add_option("files", a->files, "Artifacts")->required();
   checked->add_option("--data-dir", a->data_dir, "Data folder of the server whose signatures are verified");
   checked->callback([a, &exit_code] { exit_code = check(*a); });

@@ -68,7 +68,7 @@ std::optional<api::OutlineRequest> outline_of_kml(const std::string& text,
   const Plan plan = api::read_kml_plan(text, notes, errors);
   for (const auto& note : notes) std::fprintf(stderr, "anchord plan: %s\n", printable(note).c_str());
   if (errors.empty() && plan.outline.empty())
-    errors.push_back({"", "required", "no polygon is the building's outline", ""});
+    errors.push_back({"", "required", "no polygon is marked as the outline of the building", ""});
   if (!errors.empty()) return std::nullopt;
   const auto local = planning::local_plan(plan);
   if (!local) {
@@ -156,35 +156,38 @@ int plan_flight(const Flight& flight) {
 void add_flight(CLI::App& plan, int& exit_code) {
   auto flight = std::make_shared<Flight>();
   auto& o = flight->options;
-  auto* command =
-      plan.add_subcommand("flight", "Waypoints of a whole flight from a building's outline alone");
+  auto* command = plan.add_subcommand(
+      "flight", "Compute the waypoints of a whole flight from the outline of the building");
   command
       ->add_option("OUTLINE", flight->outline,
                    "GeoJSON or KML (docs/formats.md, Outline), - for standard input")
       ->required();
   command->add_option("--format", flight->format, "json, plan (QGroundControl) or geojson")
       ->check(CLI::IsMember({"json", "plan", "geojson"}));
-  add_word(
-      *command, "--rule,--criterion", o.rule, planning::k_rule_words,
-      "a_optimal: mean error; d_optimal: error volume; dissertation is of single points, not of flights");
+  add_word(*command, "--rule,--criterion", o.rule, planning::k_rule_words,
+           "a_optimal: mean error; d_optimal: error volume; dissertation chooses single points and cannot be "
+           "used here");
   command->add_option("--height", flight->building_height_m,
-                      "of the building in m; default: height_m of the outline, else 6");
+                      "height of the building in m [height_m of the outline, else 6]");
   command->add_option("--keep-out", o.keep_out_m, "distance from the outline in m")->capture_default_str();
-  command->add_option("--heights", o.heights_m, "to measure at, m above ground, with commas")->delimiter(',');
-  command->add_option("--max-points", o.max_points, "at most so many measuring points")
+  command
+      ->add_option("--heights", o.heights_m, "heights to measure at, in m above ground, separated by commas")
+      ->delimiter(',');
+  command->add_option("--max-points", o.max_points, "largest number of measuring points")
       ->capture_default_str();
-  command->add_option("--min-gain", o.min_gain, "stop when a point brings less than this share")
+  command
+      ->add_option("--min-gain", o.min_gain, "stop when a point improves the result by less than this share")
       ->capture_default_str();
-  command->add_option("--max-range", o.max_range_m, "no ranges beyond, m")->capture_default_str();
+  command->add_option("--max-range", o.max_range_m, "largest range, in m")->capture_default_str();
   command->add_option("--speed", o.speed_mps, "m/s")->capture_default_str();
-  command->add_option("--dwell", o.dwell_s, "s at each measuring point")->capture_default_str();
+  command->add_option("--dwell", o.dwell_s, "seconds at each measuring point")->capture_default_str();
   command->callback([flight, &exit_code] { exit_code = plan_flight(*flight); });
 }
 
 }  // namespace
 
 void add_plan_command(CLI::App& app, int& exit_code) {
-  auto* plan = app.add_subcommand("plan", "Where to measure next, without a server");
+  auto* plan = app.add_subcommand("plan", "Plan where to measure, without a server");
   plan->require_subcommand(1);
 
   struct Next {
@@ -193,10 +196,10 @@ void add_plan_command(CLI::App& app, int& exit_code) {
     bool json{false};
   };
   auto next = std::make_shared<Next>();
-  auto* command =
-      plan->add_subcommand("next", "Best next point of a flight (docs/formats.md, Planner input)");
+  auto* command = plan->add_subcommand(
+      "next", "Compute the best next point of a flight (docs/formats.md, Planner input)");
   command->add_option("INPUT", next->input, "JSON file, - for standard input")->required();
-  auto* format = command->add_option("--format", next->format, "json, or a table for people")
+  auto* format = command->add_option("--format", next->format, "json, or table")
                      ->check(CLI::IsMember({"json", "table"}))
                      ->capture_default_str();
   command->add_flag("--json", next->json, "the same as --format json")->excludes(format);

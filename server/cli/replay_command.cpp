@@ -111,7 +111,8 @@ int replay(const Options& options) {
     return derive_recording(options.source, options.out.empty() ? "-" : options.out);
   const auto speed = parse_speed(options.speed);
   if (!speed) {
-    std::fprintf(stderr, "anchord replay: --speed is a number above 0, or max: %s\n", options.speed.c_str());
+    std::fprintf(stderr, "anchord replay: --speed must be a number above 0, or max: %s\n",
+                 options.speed.c_str());
     return 2;
   }
   const auto token = read_token_file(options.token_file);
@@ -126,7 +127,9 @@ int replay(const Options& options) {
   }
   if (recording) {
     if (options.loop || !options.out.empty()) {
-      std::fprintf(stderr, "anchord replay: a recording sent to a server takes neither --loop nor --out\n");
+      std::fprintf(
+          stderr,
+          "anchord replay: with a recording that is sent to a server, --loop and --out are not allowed\n");
       return 2;
     }
     // Its rows keep their stamps and identities, so there is no live flight to imitate unless asked for.
@@ -159,27 +162,31 @@ int replay(const Options& options) {
 }  // namespace
 
 void add_replay_command(CLI::App& app, int& exit_code) {
-  auto* command = app.add_subcommand("replay",
-                                     "Play a flight through a running server as if it were live, or derive "
-                                     "the rows of a raw recording again");
+  auto* command = app.add_subcommand(
+      "replay",
+      "Replay a flight through a running server as if it were live, or decode a raw recording again");
   auto options = std::make_shared<Options>();
   command
       ->add_option("flight", options->source,
-                   "Flight folder, id of a mission of that server, or raw recording (*.anrec)")
+                   "Flight folder, id of a mission on that server, or raw recording (*.anrec)")
       ->required();
-  auto* url = command->add_option("--url", options->url, "Running server; of a recording: where its rows go")
-                  ->capture_default_str();
+  auto* url =
+      command
+          ->add_option("--url", options->url,
+                       "URL of a running server; with a recording: the server that its rows are sent to")
+          ->capture_default_str();
   command->add_option("--out", options->out,
-                      "Of a recording: folder for fixes.ndjson and ranges.ndjson; else standard output");
+                      "With a recording: folder for fixes.ndjson and ranges.ndjson [standard output]");
   auto* speed =
-      command->add_option("--speed", options->speed, "Times real time, or max (of a recording: max)")
+      command
+          ->add_option("--speed", options->speed, "Multiple of real time, or max [1; with a recording: max]")
           ->capture_default_str();
   command->add_option("--token-file", options->token_file,
                       "File with an access token (gateway and operator)");
-  command->add_option("--name", options->name, "Name of the mission; else that of the flight");
+  command->add_option("--name", options->name, "Name of the mission [name of the flight]");
   command->add_option("--mission", options->mission,
-                      "Of a recording: mission of that server for its rows; else the recorded ones");
-  command->add_flag("--loop", options->loop, "Again and again, each time a new mission");
+                      "With a recording: mission on that server for its rows [the recorded ones]");
+  command->add_flag("--loop", options->loop, "Repeat endlessly, each time as a new mission");
   command->callback([options, url, speed, &exit_code] {
     options->url_given = url->count() > 0;
     options->speed_given = speed->count() > 0;

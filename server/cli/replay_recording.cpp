@@ -65,7 +65,8 @@ class Missions {
     BOOST_OUTCOME_TRY(const auto uuid, parse_uuid(id));
     std::fprintf(stderr,
                  "replay: mission %s of the recording is not on this server: its rows go to the new mission "
-                 "%s without tags and lever arms, which no recording knows (--mission: one that has them)\n",
+                 "%s without tags and lever arms, which a recording does not contain (use --mission with one "
+                 "that has them)\n",
                  to_string(recorded).c_str(), id.c_str());
     made_.push_back(id);
     return there_[recorded] = MissionId{uuid};
@@ -109,7 +110,7 @@ class Player {
     // Its failure is told by whoever sent; what was answered counts all the same.
     (void)upload_.drain();
     const auto answers = upload_.answers();
-    std::fprintf(stderr, "replay: %llu rows accepted, %llu known already, %llu rejected\n",
+    std::fprintf(stderr, "replay: %llu rows accepted, %llu duplicates, %llu rejected\n",
                  static_cast<unsigned long long>(answers.accepted),
                  static_cast<unsigned long long>(answers.known),
                  static_cast<unsigned long long>(answers.refused));
@@ -164,7 +165,7 @@ void report(const device::ReplaySummary& s) {
                static_cast<unsigned long long>(s.events), static_cast<unsigned long long>(s.fixes),
                static_cast<unsigned long long>(s.ranges));
   if (s.unreadable_bytes > 0)
-    std::fprintf(stderr, "replay: the last %llu bytes are torn\n",
+    std::fprintf(stderr, "replay: the last %llu bytes are incomplete and were ignored\n",
                  static_cast<unsigned long long>(s.unreadable_bytes));
   for (const auto& [reason, n] : s.dropped)
     std::fprintf(stderr, "not used: %s: %llu\n", printable(reason).c_str(),

@@ -65,13 +65,13 @@ struct RestClient::State {
           answer ? std::to_string(answer.value().status) + " " + api::problem_text(answer.value().body)
                  : answer.error().message;
       if (answer && answer.value().status == 401)
-        why += "; give a file with an access token by --token-file, or the token in ANCHORD_TOKEN";
+        why += "; give a file with an access token with --token-file, or the token in ANCHORD_TOKEN";
       if (answer && !worth_another_try(answer.value().status))
         return make_error(errc_of(answer.value().status), what + ": " + why);
       if (!answered && SteadyClock::now() + length > began + k_never_answered)
         return make_error(Errc::link_lost,
-                          "no anchord answers at " + name + ": " + why +
-                              "; is it running there ('anchord doctor')? Else name it by --url");
+                          "no anchord server answers at " + name + ": " + why +
+                              "; is it running there ('anchord doctor')? Give another address with --url");
       if (SteadyClock::now() + length > began + k_give_up_after)
         return make_error(Errc::link_lost, name + " " + what + ": " + why);
       if (!pause(length)) return make_error(Errc::canceled, "stopped while " + name + " was away: " + why);

@@ -16,7 +16,8 @@ using Json = nlohmann::json;
 
 Result<Json> object_of(const std::string& path, const std::string& body) {
   auto json = Json::parse(body, nullptr, false);
-  if (!json.is_object()) return make_error(Errc::invalid_argument, path + ": the answer is no JSON object");
+  if (!json.is_object())
+    return make_error(Errc::invalid_argument, path + ": the answer is not a JSON object");
   return json;
 }
 
@@ -73,7 +74,7 @@ Result<std::string> result_of_job(RestClient& client, const Json& job) {
     }
     std::this_thread::sleep_for(std::chrono::milliseconds(200));
   }
-  return make_error(Errc::canceled, "stopped; " + path + " goes on");
+  return make_error(Errc::canceled, "stopped; " + path + " continues on the server");
 }
 
 }  // namespace anchord::cli

@@ -52,10 +52,10 @@ int rules(const RulesArguments& a) {
 void add_rules_command(CLI::App& app, int& exit_code) {
   auto* command = app.add_subcommand(
       "rules",
-      "Evaluate the plain rules of line of sight (RSS line, thresholds, weighted vote) on data sets");
+      "Evaluate the simple rules for line of sight (RSS line, thresholds, weighted vote) on data sets");
   auto a = std::make_shared<RulesArguments>();
   add_data_options(*command, a->data);
-  command->add_option("--seed", a->seed, "Seed of the folds of whole places")->capture_default_str();
+  command->add_option("--seed", a->seed, "Seed of the folds over places")->capture_default_str();
   command->add_flag("--json", a->json, "One JSON document on standard output");
   command->callback([a, &exit_code] { exit_code = rules(*a); });
 }

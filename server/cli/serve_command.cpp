@@ -34,7 +34,7 @@ int serve(const server::Config& config) {
     return app.error().code == Errc::invalid_argument ? 2 : 1;
   }
   if (!server::notify_service_manager("READY=1"))
-    server::log(server::LogLevel::warning, "the service manager at NOTIFY_SOCKET was not reached");
+    server::log(server::LogLevel::warning, "the service manager at NOTIFY_SOCKET could not be reached");
   int received = 0;
   for (;;) {
     received = wait_for_signal({SIGTERM, SIGINT, SIGHUP});

@@ -55,33 +55,36 @@ int simulate(const sim::SimulationOptions& options, const std::filesystem::path&
 
 void add_simulate_command(CLI::App& app, int& exit_code) {
   auto* command = app.add_subcommand(
-      "simulate", "Serve simulated devices on ptys and TCP ports, or make a flight without a drone");
+      "simulate", "Provide simulated devices on ptys and TCP ports, or generate a flight without a drone");
   command->require_subcommand(0, 1);
   auto devices = std::make_shared<SimulateDevices>();
   command->add_option("SCENARIO", devices->scenario,
                       "Scenario file (docs/formats.md), or demonstration: a tag on a pty, a rover on TCP");
-  command->add_flag("--json", devices->json, "One JSON object a device and a line, again after each plug");
-  command->add_option("--seed", devices->seed, "In place of the scenario's");
-  command->add_option("--duration", devices->duration_s, "Ends after so many seconds; else with Ctrl-C");
-  command->add_option("--links", devices->links, "Folder for links to the ptys, which stay over a replug");
+  command->add_flag("--json", devices->json,
+                    "Print one JSON object per device and line, again after each plug");
+  command->add_option("--seed", devices->seed, "Seed, instead of that of the scenario");
+  command->add_option("--duration", devices->duration_s, "Seconds until it ends [until Ctrl-C]");
+  command->add_option("--links", devices->links,
+                      "Folder for links to the ptys; the links stay valid after a replug");
   command->add_flag(
       "--live", devices->live,
-      "Fly by lines on standard input: go_to E N U [HEADING_DEG], speed MPS, plug NAME, unplug NAME");
+      "Fly by commands on standard input: go_to E N U [HEADING_DEG], speed MPS, plug NAME, unplug NAME");
   command->callback([devices, command, &exit_code] {
     if (!command->get_subcommands().empty()) return;
     if (devices->scenario.empty()) throw CLI::RequiredError("SCENARIO");
     exit_code = simulate_devices(*devices);
   });
   auto* flight = command->add_subcommand(
-      "flight", "One seeded flight round the demonstration building, as a flight folder");
+      "flight", "Generate a seeded flight round the demonstration building, as a flight folder");
   auto options = std::make_shared<sim::SimulationOptions>();
   auto folder = std::make_shared<std::string>();
-  flight->add_option("--seed", options->seed, "Same seed, same flight")->capture_default_str();
-  flight->add_option("--out", *folder, "Folder to write; made when absent")->required();
-  flight->add_option("--duration", options->duration_s, "Seconds of flight")->capture_default_str();
-  flight->add_option("--rate", options->range_rate_hz, "Ranges tried a second, over all anchors")
+  flight->add_option("--seed", options->seed, "Seed; the same seed gives the same flight")
       ->capture_default_str();
-  flight->add_option("--fix-rate", options->fix_rate_hz, "RTK epochs a second")->capture_default_str();
+  flight->add_option("--out", *folder, "Folder to write; created if it does not exist")->required();
+  flight->add_option("--duration", options->duration_s, "Seconds of flight")->capture_default_str();
+  flight->add_option("--rate", options->range_rate_hz, "Attempted ranges per second, over all anchors")
+      ->capture_default_str();
+  flight->add_option("--fix-rate", options->fix_rate_hz, "RTK epochs per second")->capture_default_str();
   flight->callback([options, folder, &exit_code] { exit_code = simulate(*options, *folder); });
   add_simulate_drone(*command, exit_code);
   add_simulate_site(*command, exit_code);

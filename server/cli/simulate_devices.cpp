@@ -85,7 +85,7 @@ class Commands {
       return;
     } else if (!word.empty()) {
       std::fprintf(stderr,
-                   "anchord simulate: not understood: %s (go_to E N U [HEADING_DEG], speed MPS, plug NAME, "
+                   "anchord simulate: unknown command: %s (go_to E N U [HEADING_DEG], speed MPS, plug NAME, "
                    "unplug NAME)\n",
                    line.c_str());
     }

@@ -181,9 +181,10 @@ Result<flight::Scene> scene_of(const Options& options, RestClient& client) {
                scene.world.panels.size(), scene.world.slabs.size(), scene.world.anchors.size(),
                scene.home_m.x(), scene.home_m.y());
   if (scene.world.anchors.empty())
-    return make_error(
-        Errc::invalid_argument,
-        "site " + options.site + " has no place for an anchor: publish one, or accept an outline");
+    return make_error(Errc::invalid_argument,
+                      "site " + options.site +
+                          " has neither a published anchor nor an accepted outline to place anchors in: "
+                          "publish an anchor, or accept an outline");
   return scene;
 }
 
@@ -234,27 +235,26 @@ int simulate_drone(const Options& options) {
 void add_simulate_drone(CLI::App& simulate, int& exit_code) {
   auto o = std::make_shared<Options>();
   auto* command = simulate.add_subcommand(
-      "drone", "An aircraft to fly: MAVLink on a socket, its tag and rover as measurements of a mission");
-  command->add_option("--mavlink", o->mavlink, "where the server listens (its drone.address)")
+      "drone", "Simulate an aircraft: MAVLink on a socket, its tag and rover as measurements of a mission");
+  command->add_option("--mavlink", o->mavlink, "address where the server expects MAVLink (its drone.address)")
       ->capture_default_str();
   command->add_option("--url", o->url, "of the server")->capture_default_str();
   command->add_option("--token-file", o->token_file, "file with an access token (gateway and operator)");
-  command->add_option("--mission", o->mission, "that gets the measurements; default: a new one");
-  command->add_option("--seed", o->seed, "Same seed, same noise")->capture_default_str();
+  command->add_option("--mission", o->mission, "mission that gets the measurements [a new one]");
+  command->add_option("--seed", o->seed, "Seed; the same seed gives the same noise")->capture_default_str();
   command->add_option("--ready", o->ready_s, "seconds until the pre-arm checks pass")->capture_default_str();
-  command->add_option("--wind", o->wind_mps, "from the west, m/s")->capture_default_str();
-  command->add_option("--battery", o->battery_s, "seconds of flight on it")->capture_default_str();
-  command->add_option(
-      "--scenario", o->scenario,
-      "file of lines \"seconds what happens\", like \"30 pilot LOITER\"; the same without the "
-      "seconds on standard input (drivers/sim/autopilot.md)");
-  command->add_flag("--px4", o->px4, "speaks as PX4; default ArduPilot");
-  auto* walls = command->add_flag("--walls", o->walls, "brick fronts instead of glass");
+  command->add_option("--wind", o->wind_mps, "wind from the west in m/s")->capture_default_str();
+  command->add_option("--battery", o->battery_s, "seconds of flight on a full battery")
+      ->capture_default_str();
+  command->add_option("--scenario", o->scenario,
+                      "file with lines of \"seconds event\", like \"30 pilot LOITER\"; on standard input the "
+                      "same without the seconds (drivers/sim/autopilot.md)");
+  command->add_flag("--px4", o->px4, "behave as PX4 [ArduPilot]");
+  auto* walls = command->add_flag("--walls", o->walls, "building with brick fronts instead of glass");
   command
-      ->add_option(
-          "--site", o->site,
-          "id of a site: its accepted walls delay ranges, its published anchors answer them; default: the "
-          "demonstration building")
+      ->add_option("--site", o->site,
+                   "id of a site: its accepted walls delay ranges, its published anchors answer [the "
+                   "demonstration building]")
       ->excludes(walls);
   command->callback([o, &exit_code] { exit_code = simulate_drone(*o); });
 }

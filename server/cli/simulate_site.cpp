@@ -34,7 +34,7 @@ Result<void> add_all(const Options& options) {
 int simulate_site(const Options& options) {
   const auto done = add_all(options);
   if (done) return 0;
-  tell(done.error().message + "; what was added stays, and the same command goes on from there");
+  tell(done.error().message + "; what was added stays, and the same command continues from there");
   return 1;
 }
 
@@ -45,12 +45,12 @@ void add_simulate_site(CLI::App& simulate, int& exit_code) {
   auto* command = simulate.add_subcommand(
       "site",
       "Add a labelled campaign, a trained and promoted model, a finished flight and a published revision of "
-      "the demonstration building to a running server; what is there already stays");
+      "the demonstration building to a running server; existing data stays");
   command->add_option("--url", o->url, "of the server")->capture_default_str();
   command->add_option("--token-file", o->token_file,
                       "file with an access token (gateway, operator and engineer)");
   command->add_flag("--over-others", o->over_others,
-                    "Promote and publish also where another model is active or another revision stands");
+                    "Promote and publish even if another model is active or another revision is published");
   command->callback([o, &exit_code] { exit_code = simulate_site(*o); });
 }
 

@@ -41,7 +41,7 @@ Result<Json> mission_there(RestClient& client) {
 Result<std::string> finished_mission(RestClient& client, const Told& told) {
   BOOST_OUTCOME_TRY(auto mission, mission_there(client));
   if (text_of(mission, "state") == "finished") {
-    told("flight \"" + std::string(k_mission) + "\": there already");
+    told("flight \"" + std::string(k_mission) + "\": already exists");
     return text_of(mission, "id");
   }
   BOOST_OUTCOME_TRY(auto flight, flown());
@@ -83,12 +83,12 @@ Result<void> add_demonstration_flight(RestClient& client, bool over_others, cons
   BOOST_OUTCOME_TRY(const auto revisions, get_items(client, "/api/v1/revisions"));
   for (const auto& revision : revisions) {
     if (text_of(revision, "calibration") != id) continue;
-    told("revision " + std::to_string(revision.value("revision", 0)) + " of it: there already");
+    told("revision " + std::to_string(revision.value("revision", 0)) + " of it: already exists");
     return boost::outcome_v2::success();
   }
   if (!revisions.empty() && !over_others) {
     told("not published: revision " + std::to_string(revisions.front().value("revision", 0)) +
-         " stands; --over-others publishes the simulated anchors beside it");
+         " exists; with --over-others the simulated anchors are published in addition");
     return boost::outcome_v2::success();
   }
   BOOST_OUTCOME_TRY(

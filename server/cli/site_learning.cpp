@@ -82,7 +82,7 @@ Result<void> add_campaign(RestClient& client, const Told& told) {
 Result<void> add_dataset(RestClient& client, const Told& told) {
   BOOST_OUTCOME_TRY(const auto there, found(client, "/api/v1/datasets/" + in_path(k_dataset)));
   if (there) {
-    told("campaign \"" + std::string(k_campaign) + "\" and data set \"" + k_dataset + "\": there already");
+    told("campaign \"" + std::string(k_campaign) + "\" and data set \"" + k_dataset + "\": already exists");
     return boost::outcome_v2::success();
   }
   BOOST_OUTCOME_TRYV(add_campaign(client, told));
@@ -151,13 +151,13 @@ Result<void> add_demonstration_model(RestClient& client, bool over_others, const
     if (const auto one = ours.find(task); one != ours.end() && one->second == "/api/v1/models/" + id)
       continue;
     told("not promoted: model " + id + " is active (" + task +
-         "); --over-others promotes here all the same, if the gate lets it");
+         "); with --over-others it is promoted anyway, if it passes the gate");
     return boost::outcome_v2::success();
   }
   for (const auto& [task, model] : ours) {
     const auto now = models.value(task, Json());
     if (now.is_object() && "/api/v1/models/" + text_of(now, "id") == model) {
-      told("the model of " + task + " is the active one already");
+      told("the model of " + task + " is already the active one");
       continue;
     }
     BOOST_OUTCOME_TRYV(post_json(client, model + "/promote", Json::object()));

@@ -45,7 +45,7 @@ Result<flight::Scene> fetch_site_scene(RestClient& client, const std::string& si
   const auto origin = record.value("origin", Json());
   if (!origin.is_object() || !number(origin, "lat") || !number(origin, "lon"))
     return make_error(Errc::invalid_argument,
-                      "site " + id + " has no origin: give it one, or fly its first mission");
+                      "site " + id + " has no origin: set one, or fly its first mission");
   SiteStructure structure;
   BOOST_OUTCOME_TRY(const auto buildings, get_items(client, "/api/v1/buildings?site=" + id));
   for (const auto& building : buildings) {

@@ -100,7 +100,7 @@ Result<FlightOptions> options_of(const Arguments& a) {
 Result<std::vector<FlightData>> read_all(const Arguments& a) {
   std::vector<FlightData> flights;
   if (a.folders.empty() && !a.foreign.given())
-    return make_error(Errc::invalid_argument, "a flight folder is needed, or --track and --ranges");
+    return make_error(Errc::invalid_argument, "give a flight folder, or --track and --ranges");
   if (a.foreign.given()) {
     BOOST_OUTCOME_TRY(auto flight, read_foreign_source(a.foreign));
     std::fprintf(stderr, "%s: %zu positions, %zu ranges\n", flight.mission.name.c_str(), flight.fixes.size(),
@@ -124,10 +124,9 @@ Result<std::vector<api::FlightModelsReport>> apply_models(const Arguments& a,
   std::vector<api::FlightModelsReport> reports;
   if (a.models.empty()) return reports;
   if (!a.profile.empty())
-    return make_error(
-        Errc::invalid_argument,
-        "--models and --profile: a kit's profile gives the bias of raw ranges, and of corrected "
-        "ones it would be taken off twice");
+    return make_error(Errc::invalid_argument,
+                      "--models and --profile: a kit profile contains the bias of raw ranges, which would be "
+                      "subtracted twice from corrected ones");
   std::vector<ml::Model> models;
   for (const auto& file : a.models) {
     BOOST_OUTCOME_TRY(auto model, read_model_file(file));
@@ -137,12 +136,12 @@ Result<std::vector<api::FlightModelsReport>> apply_models(const Arguments& a,
   for (auto& flight : flights) {
     reports.push_back(api::correct_flight(together, flight, a.likelihood));
     const auto& report = reports.back();
-    std::fprintf(stderr, "  %s: models corrected %zu of %zu ranges, by %.3f m on average, and weigh %zu\n",
+    std::fprintf(stderr, "  %s: models corrected %zu of %zu ranges, by %.3f m on average, and weighted %zu\n",
                  flight.mission.name.c_str(), report.n_corrected, report.n_ranges, report.mean_correction_m,
                  report.n_believed);
     if (report.n_corrected + report.n_believed == 0)
       return make_error(Errc::invalid_argument,
-                        flight.mission.name + ": the models say nothing of its ranges: " + report.note);
+                        flight.mission.name + ": the models cannot predict its ranges: " + report.note);
   }
   return reports;
 }
@@ -154,7 +153,7 @@ Result<void> check_profile_kit(const FlightOptions& options, const std::vector<F
     if (flight.mission.kit == options.profile->kit) continue;
     return make_error(Errc::invalid_argument, "--profile is of kit '" + options.profile->kit + "', flight " +
                                                   flight.mission.name + " of kit '" + flight.mission.kit +
-                                                  "': give that kit's profile, or none");
+                                                  "': give the profile of that kit, or none");
   }
   return boost::outcome_v2::success();
 }
@@ -242,7 +241,7 @@ int fit_profile(const Arguments& a) {
     return complain(fits.error());
   for (const auto& flight : flights.value()) {
     if (flight.mission.kit.empty() || flight.mission.kit != flights.value().front().mission.kit) {
-      return complain(make_error(Errc::invalid_argument, "flights of one kit are needed: '" +
+      return complain(make_error(Errc::invalid_argument, "all flights must be of one kit: '" +
                                                              flight.mission.kit + "' and '" +
                                                              flights.value().front().mission.kit + "'"));
     }
@@ -279,7 +278,7 @@ int show_profile(const std::string& file) {
   for (const auto& factor : profile.value().factors) std::printf("  %s\n", factor.flight.c_str());
   std::printf("bias %.3f m (sigma %.3f), %s (z %.1f, limit %.1f)\n", gate.bias_m, gate.sigma_m,
               !gate.known       ? "not determined"
-              : gate.calibrated ? "taken as calibrated"
+              : gate.calibrated ? "treated as calibrated"
                                 : "not calibrated",
               gate.z, options.bias_gate_z);
   std::printf(
@@ -292,37 +291,37 @@ int show_profile(const std::string& file) {
 
 void add_options(CLI::App& command, Arguments& a) {
   command.add_option("flights", a.folders,
-                     "Flight folders (docs/formats.md); flights of one kit learn from each other");
-  add_word(command, "--solver", a.solver, k_solver_words, "How the minimum is searched");
+                     "Flight folders (docs/formats.md); flights of one kit share its calibration");
+  add_word(command, "--solver", a.solver, k_solver_words, "Method of the minimisation");
   add_word(command, "--weights", a.weights, k_weights_words,
            "inverse_variance, or dissertation: as eq 7.11 is printed");
-  add_word(command, "--loss", a.loss, k_loss_words, "What a large residual counts");
+  add_word(command, "--loss", a.loss, k_loss_words, "Weight of large residuals (loss)");
   command.add_option("--dims", a.dims, "3, or 2 with the height held")->check(CLI::IsMember({2, 3}));
   command.add_option("--height", a.height_m,
                      "With --dims 2: height of all anchors in metres, ellipsoidal where the track is global "
-                     "(the heights of the table), else z; default: mean height of the track");
+                     "(the heights of the table), else z [mean height of the track]");
   command
       .add_option("--height-prior", a.height_prior,
-                  "HEIGHT,SIGMA in metres: about where all anchors are, such as the poles they are on; "
+                  "HEIGHT,SIGMA in metres: approximate height of all anchors, such as that of their poles; "
                   "reference as for --height")
       ->delimiter(',')
       ->expected(2);
   command.add_option("--max-gap", a.max_gap_s,
-                     "Longest interval of the track, in seconds, to place a range in; default: as long as "
-                     "interpolation misses by less than 0.5 m");
-  add_word(command, "--min-fix", a.min_fix, k_fix_words, "Least fix class of the track");
+                     "Longest interval of the track in seconds in which a range is placed [as long as the "
+                     "interpolation error is below 0.5 m]");
+  add_word(command, "--min-fix", a.min_fix, k_fix_words, "Lowest fix class of the track that is used");
   command
       .add_option("--max-correction-age", a.max_correction_age_s,
                   "Seconds; RTK fixed with older corrections counts as float")
       ->check(CLI::Range(0.1, 3600.0))
       ->capture_default_str();
   command.add_option("--bias", a.bias_m,
-                     "Range bias of the kit in metres, taken as known instead of estimated");
+                     "Known range bias of the kit in metres, used instead of an estimate");
   command
-      .add_option("--lever-arm-sigma", a.lever_arm_sigma_m,
-                  "How well the lever arm was measured, forward and left, one sigma in metres: the regions "
-                  "hold it, and a flight that kept one heading is not held back for it; default: "
-                  "lever_arm_sigma_m of flight.json")
+      .add_option(
+          "--lever-arm-sigma", a.lever_arm_sigma_m,
+          "One sigma of the measured lever arm, forward and left, in metres: the regions include it, and a "
+          "flight with one heading is not withheld because of it [lever_arm_sigma_m of flight.json]")
       ->check(CLI::Range(k_least_lever_arm_sigma_m, k_most_lever_arm_sigma_m));
   command.add_option("--profile", a.profile, "Kit profile of earlier flights (anchord profile fit)");
 }
@@ -341,43 +340,46 @@ void add_solve_command(CLI::App& app, int& exit_code) {
   command->add_option("--clues", arguments->priors, "Deprecated name of --priors")->excludes(priors);
   auto* models =
       command->add_option("--models", arguments->models,
-                          "Model artifacts (anchord train) that correct and weigh the ranges, one a task");
-  add_word(*command, "--likelihood", arguments->likelihood, api::k_likelihood_words,
-           "With --models: one_sided, the models' own likelihood, or loss, their corrections alone")
+                          "Model artifacts (anchord train) that correct and weight the ranges, one per task");
+  add_word(
+      *command, "--likelihood", arguments->likelihood, api::k_likelihood_words,
+      "With --models: one_sided, weight by the likelihood of the models, or loss, use only their corrections")
       ->needs(models);
   add_word(*command, "--worth", arguments->ask_worth, api::k_worth_words,
-           "With --models: shown, leave them out of a flight that they do not explain better than its "
-           "ranges as they came, or ignored")
+           "With --models: shown, do not use them for a flight that they do not explain better than its "
+           "uncorrected ranges, or ignored")
       ->needs(models);
   add_word(*command, "--method", arguments->method, k_anchor_method_words,
            "joint, or for comparison linear (eq 7.2 to 7.5) or wls (eq 7.10), which are never acceptable; "
-           "the report and the JSON have all three");
+           "the report and the JSON contain all three");
   add_word(*command, "--format", arguments->format, k_solve_format_words, "On standard output");
   auto* report = command->add_option(
       "--report", arguments->report.file,
-      "Also write a printable page to this HTML file; of several flights FILE-1.html, ...");
+      "Also write a printable report to this HTML file; with several flights to FILE-1.html, ...");
   command
       ->add_option("--truth", arguments->report.truth,
-                   "For the page: anchors_truth.csv with the surveyed positions to compare with")
+                   "For the report: anchors_truth.csv with surveyed positions to compare with")
       ->needs(report);
   command
-      ->add_option("--iterations", arguments->report.iterations,
-                   "For the page: growing parts of the flight to solve, for the error curves; 0 for none")
+      ->add_option(
+          "--iterations", arguments->report.iterations,
+          "For the report: number of growing parts of the flight to solve for the error curves; 0: none")
       ->check(CLI::Range(0, 50))
       ->needs(report);
   command->callback([arguments, &exit_code] { exit_code = solve(*arguments); });
 }
 
 void add_profile_command(CLI::App& app, int& exit_code) {
-  auto* command = app.add_subcommand("profile", "Calibration of a kit, carried from flight to flight");
+  auto* command = app.add_subcommand("profile", "Calibration of a kit, kept from flight to flight");
   command->require_subcommand(1);
   auto arguments = std::make_shared<Arguments>();
   auto* fit = command->add_subcommand(
-      "fit", "Learn bias, range curve, lag and antenna offset from flights of one kit");
+      "fit", "Estimate bias, range curve, lag and antenna offset from flights of one kit");
   add_options(*fit, *arguments);
   fit->add_option("--out", arguments->out, "File to write")->required();
   fit->callback([arguments, &exit_code] { exit_code = fit_profile(*arguments); });
-  auto* show = command->add_subcommand("show", "Print a profile and the prior it gives the next flight");
+  auto* show =
+      command->add_subcommand("show", "Print a profile and the prior that it gives to the next flight");
   auto file = std::make_shared<std::string>();
   show->add_option("file", *file, "Profile written by profile fit")->required();
   show->callback([file, &exit_code] { exit_code = show_profile(*file); });

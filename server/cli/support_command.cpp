@@ -39,17 +39,18 @@ std::string from_here(const Options& options) {
   DoctorOptions look;
   look.data_dir = options.data_dir;
   look.database = options.database;
-  return api::tar_of({{"README.txt", "No server runs on this folder: this is what 'anchord doctor' finds.\n"},
-                      {"doctor.json", api::without_secrets(findings_json(examine(look)))}},
-                     SystemClock().now());
+  return api::tar_of(
+      {{"README.txt", "No server is running on this folder: this is what 'anchord doctor' finds.\n"},
+       {"doctor.json", api::without_secrets(findings_json(examine(look)))}},
+      SystemClock().now());
 }
 
 }  // namespace
 
 void add_support_command(CLI::App& app, int& exit_code) {
-  auto* command = app.add_subcommand(
-      "support-bundle",
-      "Put versions, settings, log, metrics, events and doctor's findings into one archive, without secrets");
+  auto* command = app.add_subcommand("support-bundle",
+                                     "Collect versions, settings, log, metrics, events and the findings of "
+                                     "anchord doctor in one archive, without secrets");
   const auto options = std::make_shared<Options>();
   command->add_option("--data-dir", options->data_dir, "folder of the database [anchord-data]")
       ->envname("ANCHORD_DATA_DIR");
@@ -66,7 +67,7 @@ void add_support_command(CLI::App& app, int& exit_code) {
     file << (served ? served->value() : from_here(*options));
     file.close();
     if (!file) {
-      std::fprintf(stderr, "anchord: %s cannot be written: name another file with --out\n",
+      std::fprintf(stderr, "anchord: %s cannot be written: give another file with --out\n",
                    options->out.c_str());
       exit_code = 1;
       return;

@@ -58,15 +58,15 @@ void print(const sync::Conflict& conflict) {
 void print(const sync::Outcome& o, bool dry_run) {
   if (!dry_run)
     std::printf(
-        "flights: %llu sent, %llu there already, %llu not finished\nmodels: %llu sent, %llu there already\n"
-        "anchors: %llu published, %llu there already, %llu left as they are there\n",
+        "flights: %llu sent, %llu already there, %llu not finished\nmodels: %llu sent, %llu already "
+        "there\nanchors: %llu published, %llu already there, %llu left as published there\n",
         n(o.flights_sent), n(o.flights_there), n(o.flights_recording), n(o.models_sent), n(o.models_there),
         n(o.anchors_published), n(o.anchors_there), n(o.anchors_left));
   for (const auto& conflict : o.undecided) print(conflict);
   if (!o.undecided.empty())
     std::printf(
-        "Both sides published these: decide by --keep 'SITE=field' or --keep 'SITE=centre' (name or id), or "
-        "by --keep field|centre for all\n");
+        "Both sides have published these: decide with --keep 'SITE=field' or --keep 'SITE=centre' (name or "
+        "id), or with --keep field|centre for all\n");
   for (const auto& one : o.failed) std::printf("FAILED %s\n", printable(one).c_str());
 }
 
@@ -78,8 +78,9 @@ Result<std::string> field_token(const Options& options) {
 Result<sync::Outcome> run(const Options& options, const sync::Decisions& decisions) {
   const auto local = options.url.empty() ? running_server(options.data_dir) : std::optional(options.url);
   if (!local)
-    return make_error(Errc::not_found, "no server runs in " + options.data_dir +
-                                           ": start anchord serve there, or name the field server by --url");
+    return make_error(Errc::not_found,
+                      "no server is running on the data folder " + options.data_dir +
+                          ": start anchord serve there, or give the field server with --url");
   sync::PeerOptions peer;
   peer.give_up = std::chrono::seconds(options.wait_s);
   peer.report = [](const std::string& line) { std::fprintf(stderr, "%s\n", printable(line).c_str()); };
@@ -105,7 +106,8 @@ int sync_command(const Options& options) {
   const auto outcome = run(options, decisions.value());
   if (!outcome) {
     const bool input = outcome.error().code == Errc::invalid_argument;
-    return fail(outcome.error().message + (input ? "" : "; what has arrived stays, run it again to go on"),
+    return fail(outcome.error().message +
+                    (input ? "" : "; what has been sent stays, run the command again to continue"),
                 input ? 2 : 1);
   }
   print(outcome.value(), options.dry_run);
@@ -123,18 +125,18 @@ void add_sync_command(CLI::App& app, int& exit_code) {
   command->add_option("--token-file", options->token_file,
                       "file with an access token of the centre (role engineer); else ANCHORD_TOKEN");
   command
-      ->add_option("--data-dir", options->data_dir, "folder of the field server, which runs [anchord-data]")
+      ->add_option("--data-dir", options->data_dir, "data folder of the running field server [anchord-data]")
       ->envname("ANCHORD_DATA_DIR");
-  command->add_option("--url", options->url, "address of the field server; else that of its folder");
+  command->add_option("--url", options->url, "address of the field server [that of its data folder]");
   command->add_option("--url-token-file", options->url_token_file,
-                      "file with an access token of the field server; else the admin token of its folder");
+                      "file with an access token of the field server [the admin token of its data folder]");
   command
       ->add_option("--keep", options->keep,
-                   "where both published: field or centre, or of one site SITE=field; may be repeated")
+                   "where both have published: field or centre, or SITE=field for one site; may be repeated")
       ->allow_extra_args(false);
   command->add_option("--wait", options->wait_s, "seconds to wait for a server that does not answer [60]")
       ->check(CLI::Range(1, 86'400));
-  command->add_flag("--dry-run", options->dry_run, "show what would go, send nothing");
+  command->add_flag("--dry-run", options->dry_run, "show what would be sent, send nothing");
   command->callback([&exit_code, options] { exit_code = sync_command(*options); });
 }
 

@@ -79,7 +79,7 @@ std::string full_path(const fs::path& path) {
 int print_made(const fs::path& folder) {
   const auto facts = server::facts_of(text_of(folder / k_certificate), std::string(k_certificate));
   const auto authority = server::facts_of(text_of(folder / k_authority), std::string(k_authority));
-  if (!facts || !authority) return fail("cannot read back what was written to " + folder.string());
+  if (!facts || !authority) return fail("cannot read what was written to " + folder.string());
   std::printf("certificate  %s\n  for        %s\n  until      %s\nauthority    %s\n  SHA-256    %s\n",
               full_path(folder / k_certificate).c_str(), printable(joined(facts.value().names)).c_str(),
               to_rfc3339(facts.value().not_after).c_str(), full_path(folder / k_authority).c_str(),
@@ -101,7 +101,7 @@ void print_next_steps(const fs::path& folder) {
       "  iOS       open the file, then Settings > General > VPN & Device Management, and > About > "
       "Certificate Trust\n"
       "  Windows   certutil -addstore Root ca.pem\n"
-      "Keep ca.key where only you reach it: whoever has it can pass for any site to these clients.\n",
+      "Keep ca.key where only you have access: whoever has it can impersonate any site to these clients.\n",
       full_path(folder / k_certificate).c_str(), full_path(folder / k_key).c_str(), ca.c_str());
 }
 
@@ -110,11 +110,12 @@ int init(Options options) {
   std::error_code error;
   for (const auto name : {k_authority, k_authority_key, k_certificate, k_key}) {
     if (options.force || !fs::exists(folder / name, error)) continue;
-    return fail((folder / name).string() +
-                    " is there already: 'anchord tls renew' makes a new certificate that clients " +
-                    "trust without being asked; --force replaces the authority too, which every client must "
-                    "be made to trust anew",
-                2);
+    return fail(
+        (folder / name).string() +
+            " already exists: 'anchord tls renew' creates a new certificate that clients trust without a "
+            "change; --force also replaces the authority, which every client must then be set to "
+            "trust again",
+        2);
   }
   if (options.wanted.names.empty()) options.wanted.names = names_of_this_machine();
   add_loopback(options.wanted.names);
@@ -140,11 +141,11 @@ int renew(Options options) {
   const PemPair authority{text_of(folder / k_authority), text_of(folder / k_authority_key)};
   if (authority.certificate.empty() || authority.key.empty())
     return fail("no authority (ca.pem and ca.key) in " + folder.string() +
-                    ": 'anchord tls init' makes one; --dir names another folder",
+                    ": 'anchord tls init' creates one; give another folder with --dir",
                 2);
   if (options.wanted.names.empty()) {
     const auto former = server::facts_of(text_of(folder / k_certificate), (folder / k_certificate).string());
-    if (!former) return fail(former.error().message + "; give its names by --name", 2);
+    if (!former) return fail(former.error().message + "; give its names with --name", 2);
     options.wanted.names = former.value().names;
   }
   add_loopback(options.wanted.names);
@@ -154,7 +155,7 @@ int renew(Options options) {
     return fail(written.error().message);
   if (const int code = print_made(folder); code != 0) return code;
   std::printf(
-      "\nA running server takes it at SIGHUP (systemctl reload anchord). Clients trust it already.\n");
+      "\nA running server loads it at SIGHUP (systemctl reload anchord). Clients already trust it.\n");
   return 0;
 }
 
@@ -177,21 +178,23 @@ int show(const std::string& file) {
 
 void add_tls_command(CLI::App& app, int& exit_code) {
   auto* command =
-      app.add_subcommand("tls", "Make and show the certificate of a server without a public name");
+      app.add_subcommand("tls", "Create and show the certificate of a server without a public name");
   command->require_subcommand(1);
   const auto options = std::make_shared<Options>();
   const auto common = [&](CLI::App* sub) {
     sub->add_option("--data-dir", options->data_dir, "folder of the database [anchord-data]")
         ->envname("ANCHORD_DATA_DIR");
     sub->add_option("--dir", options->dir, "folder of the certificates [DATA_DIR/tls]");
-    sub->add_option("--name", options->wanted.names, "host name or address that clients use; again for each");
-    sub->add_option("--days", options->wanted.days, "how long the certificate holds, at most 825 [397]");
+    sub->add_option("--name", options->wanted.names,
+                    "host name or address that clients use; repeat for each one");
+    sub->add_option("--days", options->wanted.days,
+                    "days for which the certificate is valid, at most 825 [397]");
   };
-  auto* make = command->add_subcommand("init", "Make an authority and a certificate signed by it");
+  auto* make = command->add_subcommand("init", "Create an authority and a certificate signed by it");
   common(make);
-  make->add_flag("--force", options->force, "replace what is there, the authority too");
+  make->add_flag("--force", options->force, "replace existing files, the authority too");
   make->callback([&exit_code, options] { exit_code = init(*options); });
-  auto* again = command->add_subcommand("renew", "Make a new certificate by the authority that is there");
+  auto* again = command->add_subcommand("renew", "Create a new certificate with the existing authority");
   common(again);
   again->callback([&exit_code, options] { exit_code = renew(*options); });
   auto* print = command->add_subcommand("show", "Print names, dates and fingerprint of a certificate file");

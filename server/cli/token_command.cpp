@@ -72,9 +72,10 @@ int with_folder(const Options& options, Act act) {
   storage.data_dir = options.data_dir;
   const bool elsewhere = !options.database.empty() || !sql::postgres_of_folder(storage.data_dir).empty();
   if (!std::filesystem::exists(elsewhere ? storage.data_dir : storage.data_dir / "anchord.db"))
-    return fail("there is no anchord database in " + options.data_dir +
-                    ": name its folder by --data-dir; 'anchord serve' makes a new one, with a first token",
-                2);
+    return fail(
+        "there is no anchord database in " + options.data_dir +
+            ": give its folder with --data-dir; 'anchord serve' creates a new one, with a first token",
+        2);
   auto database = open_store(options.database, storage);
   if (!database) return fail(database.error().message);
   const SystemClock clock;
@@ -135,7 +136,7 @@ int revoke(const Options& options) {
 }  // namespace
 
 void add_token_command(CLI::App& app, int& exit_code) {
-  auto* command = app.add_subcommand("token", "Make, list and revoke access tokens");
+  auto* command = app.add_subcommand("token", "Create, list and revoke access tokens");
   command->require_subcommand(1);
   const auto options = std::make_shared<Options>();
   const auto common = [&](CLI::App* sub) {
@@ -144,18 +145,18 @@ void add_token_command(CLI::App& app, int& exit_code) {
     add_database_option(*sub, options->database);
     sub->add_option("--url", options->url, "address of a running server (token in ANCHORD_TOKEN)");
   };
-  auto* make = command->add_subcommand("create", "Make a token and print it, once");
+  auto* make = command->add_subcommand("create", "Create a token and print it, once");
   common(make);
-  make->add_option("--name", options->name, "who or what it is for")->required();
+  make->add_option("--name", options->name, "name: who or what the token is for")->required();
   make->add_option("--role", options->roles,
                    "viewer, integrator, gateway, engineer, operator, admin; may be repeated")
       ->required();
   make->add_option("--expires", options->expires, "like 365d, 12h or 2027-01-31T00:00:00Z [never]");
   make->callback([&exit_code, options] { exit_code = create(*options); });
-  auto* show = command->add_subcommand("list", "List tokens (never their secrets)");
+  auto* show = command->add_subcommand("list", "List tokens (without their secrets)");
   common(show);
   show->callback([&exit_code, options] { exit_code = list(*options); });
-  auto* end = command->add_subcommand("revoke", "Revoke a token at once");
+  auto* end = command->add_subcommand("revoke", "Revoke a token immediately");
   common(end);
   end->add_option("id", options->id, "id of the token")->required();
   end->callback([&exit_code, options] { exit_code = revoke(*options); });

@@ -61,7 +61,7 @@ TopDocument document_of(const Question& question, server::ClientResponse answer)
   const bool unready = answer.status == 503 && question.to == &TopDocuments::ready;
   if (answer.status == 200 || unready) return {std::move(answer.body), {}};
   std::string why = std::to_string(answer.status) + " " + api::problem_text(answer.body);
-  if (answer.status == 401) why += "; give a token by --token-file or ANCHORD_TOKEN";
+  if (answer.status == 401) why += "; give a token with --token-file or ANCHORD_TOKEN";
   return {{}, std::move(why)};
 }
 
@@ -153,8 +153,8 @@ int top(const Options& options) {
   auto first = read_all(client.value());
   if (!first && first.error().code == Errc::canceled) return 0;
   if (!first)
-    return fail("no anchord answers at " + url + ": " + first.error().message +
-                    "; is it running there ('anchord doctor')? Else name it by --url",
+    return fail("no anchord server answers at " + url + ": " + first.error().message +
+                    "; is it running there ('anchord doctor')? Give another address with --url",
                 1);
   auto documents = std::move(first).value();
   if (!documents.system.problem.empty() && !documents.devices.problem.empty())
@@ -173,14 +173,15 @@ void add_top_command(CLI::App& app, int& exit_code) {
   auto* command = app.add_subcommand(
       "top", "Show a running server on one screen: alarms, mission, devices, queues, jobs (Ctrl-C ends)");
   const auto options = std::make_shared<Options>();
-  command->add_flag("--once", options->once, "print it once as plain text; so does output to a file or pipe");
-  command->add_option("--interval", options->interval_s, "seconds from one reading to the next [1]")
+  command->add_flag("--once", options->once,
+                    "print once as plain text; this is also done when the output is a file or pipe");
+  command->add_option("--interval", options->interval_s, "seconds between two readings [1]")
       ->check(CLI::Range(0.2, 3600.0));
-  command->add_option("--url", options->url, "address of the server; else that of the data folder's server");
+  command->add_option("--url", options->url, "address of the server [the server of the data folder]");
   auto* folder = command->add_option("--data-dir", options->data_dir, "folder of the database [anchord-data]")
                      ->envname("ANCHORD_DATA_DIR");
   command->add_option("--token-file", options->token_file,
-                      "file with an access token (viewer); else ANCHORD_TOKEN, else that of the data folder");
+                      "file with an access token (viewer) [ANCHORD_TOKEN, else that of the data folder]");
   command->callback([&exit_code, options, folder] {
     options->data_dir_given = folder->count() > 0;
     exit_code = top(*options);

@@ -183,7 +183,7 @@ Section missions(const TopDocuments& documents, double now_us, std::size_t width
                             {"POSITIONS, rows", true, false},
                             {"DEVICES", false, true}},
                            rows, width);
-  auto out = section("MISSION IN FLIGHT", documents.missions, std::move(table), "no mission records");
+  auto out = section("MISSION IN FLIGHT", documents.missions, std::move(table), "no mission is recording");
   if (const auto line = aircraft(at(parsed(documents.system), "drone")); !line.empty()) {
     out.lines.insert(out.lines.begin(), line);
     ++out.kept_first;
@@ -226,21 +226,22 @@ Section devices(const TopDocuments& documents, double now_us, std::size_t width)
                             {"REASON", false, true}},
                            rows, width);
   auto out = section(counted("DEVICES", n), documents.devices, std::move(table),
-                     "none is set up: anchord devices discover, then add");
+                     "no device is set up: run anchord devices discover, then anchord devices add");
   if (radios > 0)
-    out.lines.push_back("Radios in the rows: " + std::to_string(radios) + ", last seen " +
+    out.lines.push_back("Radios seen in the measurements: " + std::to_string(radios) + ", last seen " +
                         seconds(last_radio_s) + " s ago");
   return out;
 }
 
 Section queues(const TopDocuments& documents, std::size_t width) {
   const auto& metrics = documents.metrics;
-  Rows rows{{"rows to be stored or estimated", written(number(parsed(documents.system), "queue_depth"), 0)}};
+  Rows rows{{"rows waiting for storage or estimation",
+             written(number(parsed(documents.system), "queue_depth"), 0)}};
   struct Queue {
     const char* what;
     const char* metric;
   };
-  constexpr Queue k_queues[]{{"of these, rows for live estimates", "anchord_live_queue_rows"},
+  constexpr Queue k_queues[]{{"of these, rows waiting for the live estimates", "anchord_live_queue_rows"},
                              {"commands", "anchord_command_queue"},
                              {"requests", "anchord_worker_queue"},
                              {"computations", "anchord_heavy_queue"}};
@@ -291,7 +292,7 @@ Section jobs(const TopDocuments& documents, double now_us, std::size_t width) {
 }
 
 std::string health(const TopDocument& ready) {
-  if (!ready.problem.empty()) return "Health: not known: " + ready.problem;
+  if (!ready.problem.empty()) return "Health: unknown: " + ready.problem;
   const auto json = parsed(ready);
   const auto status = text(json, "status");
   std::string out = "Health: " + (status.empty() ? std::string("not known") : capitals(status));
@@ -308,10 +309,10 @@ std::vector<std::string> head(const TopDocuments& documents, const TopReading& r
   if (const auto git = text(version, "git"); !git.empty()) title += " (" + git + ")";
   std::vector<std::string> out{title + " at " + reading.url};
   if (reading.away) {
-    out.push_back("SERVER AWAY since " + clock_time(reading.away->since) + ": " + reading.away->why);
+    out.push_back("SERVER NOT REACHABLE since " + clock_time(reading.away->since) + ": " + reading.away->why);
     out.push_back("OLD data of " + clock_time(reading.read_at) + ", " +
                   seconds(std::max(0.0, seconds_between(reading.read_at, reading.now))) +
-                  " s ago; asking again until it answers");
+                  " s ago; trying again until it answers");
   } else {
     out.push_back("Read " + clock_time(reading.read_at));
   }

@@ -51,7 +51,7 @@ Result<void> read_try(const std::string& text, ml::Grid& grid) {
   const auto dot = text.find('.'), equals = text.find('=');
   const auto method = ml::method_of(text.substr(0, dot));
   if (dot == std::string::npos || equals == std::string::npos || equals < dot || !method)
-    return make_error(Errc::invalid_argument, "--try is method.setting=value,value, not " + text);
+    return make_error(Errc::invalid_argument, "--try must be method.setting=value,value, not " + text);
   auto& values = grid[*method][text.substr(dot + 1, equals - dot - 1)];
   for (std::size_t at = equals + 1; at <= text.size();) {
     const auto end = std::min(text.find(',', at), text.size());
@@ -170,42 +170,44 @@ int train(const TrainArguments& a) {
 
 void add_train_command(CLI::App& app, int& exit_code) {
   auto* command = app.add_subcommand(
-      "train", "Fit a model of line of sight or range bias to a table of labelled rangings");
+      "train", "Train a model of line of sight or range bias on a table of labelled ranges");
   auto a = std::make_shared<TrainArguments>();
   add_data_options(*command, a->data);
-  add_word(*command, "--task", a->task, ml::k_task_words, "What the model learns");
+  add_word(*command, "--task", a->task, ml::k_task_words, "Task of the model");
   command
       ->add_option(
           "--method", a->methods,
-          "auto, or several of logistic, random_forest, svm, boosted, average, tree_average, constant, "
+          "auto, or one or more of logistic, random_forest, svm, boosted, average, tree_average, constant, "
           "polynomial, multivariate, least_absolute: the best of them on held-out places")
       ->delimiter(',')
       ->capture_default_str();
   add_word(*command, "--engine", a->engine, ml::k_engine_words,
-           "own (libsvm and our trees) or opencv, which fits svm and random_forest");
-  command->add_option("--features", a->features, "Features by name (default: chosen with the method)")
+           "own (libsvm and anchord's own trees) or opencv, which has svm and random_forest");
+  command->add_option("--features", a->features, "Names of features (default: chosen with the method)")
       ->delimiter(',');
-  command->add_option("--folds", a->folds, "Folds of whole places")
+  command->add_option("--folds", a->folds, "Number of folds over places")
       ->check(CLI::Range(2, 1000))
       ->capture_default_str();
   command->add_option("--seed", a->seed, "Seed of folds and trees")->capture_default_str();
   command
       ->add_option("--per-placement", a->per_placement,
-                   "Rows of one placement used for training; repeats are near copies")
+                   "Rows of one placement used for training; repeated measurements are almost copies")
       ->check(CLI::Range(1, 100000))
       ->capture_default_str();
   command
       ->add_option("--max-fpr", a->max_fpr,
-                   "Choose the threshold so that at most this share of held-out NLOS is called LOS")
+                   "Choose the threshold so that at most this share of held-out NLOS is classified as LOS")
       ->check(CLI::Range(0.0, 1.0));
-  command->add_flag("--grid", a->grid, "Search the declared grid of settings as well");
+  command->add_flag("--grid", a->grid, "Also search the predefined grid of settings");
   command->add_option("--try", a->tries,
-                      "Values of one setting to search, as svm.c=1,10,100; repeat for more settings");
-  command->add_option("--hold-out", a->held_out, "Places no part of training sees: the final test")
+                      "Values of one setting to search, like svm.c=1,10,100; repeat for more settings");
+  command->add_option("--hold-out", a->held_out, "Places held out of training for the final test")
       ->delimiter(',');
-  command->add_option("--hold-out-share", a->held_out_share, "Or this share of the places, drawn by the seed")
+  command
+      ->add_option("--hold-out-share", a->held_out_share,
+                   "Or the share of places to hold out, drawn with the seed")
       ->check(CLI::Range(0.0, 0.9));
-  command->add_flag("--importance", a->importance, "Rank the features by out-of-bag permutation");
+  command->add_flag("--importance", a->importance, "Rank the features by out-of-bag permutation importance");
   command->add_flag("--selection", a->selection, "Forward filter of the features in the order of importance");
   command
       ->add_option("--threads", a->threads, "Threads (default: all cores); the model does not depend on it")

@@ -32,14 +32,14 @@ int verify(const std::string& pack, const std::string& key_file) {
   const auto& v = verdict.value();
   for (const auto& fault : v.faults) std::printf("differs: %s\n", printable(fault).c_str());
   if (!v.faults.empty()) return k_differs;
-  std::printf("whole: %zu files are what the %s says\n", v.n_files,
+  std::printf("intact: %zu files match the %s\n", v.n_files,
               v.kind == api::PackVerdict::Kind::pack ? "list of checksums" : "manifest");
   if (v.kind == api::PackVerdict::Kind::bundle)
-    std::printf("not signed: a flight bundle has no signature, a hand-over pack has\n");
+    std::printf("not signed: only a hand-over pack has a signature, a flight bundle has none\n");
   else if (v.own_key)
     std::printf(
-        "signed with the key in the pack, %s: --key with the server's own (GET /api/v1/signing-key) "
-        "proves whose it is\n",
+        "signed with the key in the pack, %s: to prove which server signed, give its key with --key (GET "
+        "/api/v1/signing-key)\n",
         v.key_id.c_str());
   else
     std::printf("signed with the key given, %s\n", v.key_id.c_str());
@@ -50,11 +50,11 @@ int verify(const std::string& pack, const std::string& key_file) {
 
 void add_verify_command(CLI::App& app, int& exit_code) {
   auto* command = app.add_subcommand(
-      "verify", "Hold a hand-over pack or a flight bundle against its checksums and signature");
+      "verify", "Check a hand-over pack or a flight bundle against its checksums and signature");
   const auto pack = std::make_shared<std::string>();
   const auto key = std::make_shared<std::string>();
-  command->add_option("pack", *pack, "file to look at")->required();
-  command->add_option("--key", *key, "public key of the server it comes from, PEM; else that in the pack");
+  command->add_option("pack", *pack, "file to check")->required();
+  command->add_option("--key", *key, "public key of the server it comes from, PEM [that in the pack]");
   command->callback([&exit_code, pack, key] { exit_code = verify(*pack, *key); });
 }
 

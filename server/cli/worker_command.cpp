@@ -51,10 +51,10 @@ int run(Options& options) {
 }  // namespace
 
 void add_worker_command(CLI::App& app, int& exit_code) {
-  auto* command = app.add_subcommand(
-      "worker",
-      "Run training runs of a server on this machine: with --database of its PostgreSQL. Without it: the "
-      "process that a server starts by itself");
+  auto* command =
+      app.add_subcommand("worker",
+                         "Run training runs of a server on this machine: with --database of its PostgreSQL. "
+                         "Without --database this is the process that a server starts by itself");
   const auto options = std::make_shared<Options>();
   command
       ->add_option(
@@ -62,10 +62,11 @@ void add_worker_command(CLI::App& app, int& exit_code) {
           "PostgreSQL of the server, like postgresql://anchord_worker@host/name; see docs/workers.md")
       ->envname("ANCHORD_DATABASE");
   command->add_option("--name", options->worker.name,
-                      "name that its jobs show; one for each worker [HOST/PROCESS]");
+                      "name that is shown with its jobs; a different one for each worker [HOST/PROCESS]");
   command
-      ->add_option("--lease-s", options->lease_s,
-                   "seconds without a sign of this worker after which its job is another's [15]")
+      ->add_option(
+          "--lease-s", options->lease_s,
+          "seconds without a sign of life of this worker after which another one takes over its job [15]")
       ->check(CLI::Range(1.0, 3600.0));
   command->add_option("--log-level", options->log_level, "debug, info, warning or error [info]")
       ->check(CLI::IsMember({"debug", "info", "warning", "error"}));

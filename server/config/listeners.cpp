@@ -14,7 +14,7 @@ Result<std::vector<Listener>> listeners_of(const Config& config) {
   if (certificate == config.text("tls.key").empty())
     return make_error(Errc::invalid_argument,
                       "tls.certificate and tls.key belong together: one of them is not set ('anchord tls "
-                      "init' makes both)");
+                      "init' creates both)");
   std::vector<Listener> out;
   for (const auto& entry : config.list("listen")) {
     Listener listener{entry, certificate};
@@ -36,16 +36,16 @@ Result<void> check_listeners(const Config& config, const std::vector<Listener>& 
     BOOST_OUTCOME_TRY(const bool loopback, is_loopback(listener.address));
     if (loopback) continue;
     if (config.text("auth") == "off") {
-      return make_error(Errc::invalid_argument, "--auth=off is for loopback addresses only; " +
-                                                    listener.address + " could be reached by others");
+      return make_error(Errc::invalid_argument, "--auth=off is allowed on loopback addresses only; " +
+                                                    listener.address +
+                                                    " could be reached from other machines");
     }
     if (!listener.tls && !config.flag("insecure")) {
-      return make_error(
-          Errc::invalid_argument,
-          listener.address +
-              " can be reached by others and there is no TLS: give --tls-certificate and --tls-key "
-              "('anchord tls init' makes them), put a TLS proxy before a loopback address, or say "
-              "--insecure");
+      return make_error(Errc::invalid_argument,
+                        listener.address +
+                            " can be reached from other machines and there is no TLS: give --tls-certificate "
+                            "and --tls-key ('anchord tls init' creates them), use a TLS proxy in front of a "
+                            "loopback address, or accept this with --insecure");
     }
   }
   return boost::outcome_v2::success();

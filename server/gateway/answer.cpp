@@ -70,7 +70,7 @@ std::optional<Assessment> assess_trouble(int status, const std::map<std::string,
       return waits(
           Link::unauthorized,
           told(status, body) +
-              ": the token is not (or no longer) one of this server. Make one there with 'anchord token "
+              ": the token is not (or no longer) valid on this server. Create one there with 'anchord token "
               "create NAME --role gateway --role viewer' and write it to the token file; it is read "
               "again at every attempt",
           asked);
@@ -89,8 +89,10 @@ std::optional<Assessment> assess_trouble(int status, const std::map<std::string,
   if (status == 408 || status == 425 || status == 429 || status >= 500)
     return waits(Link::busy, told(status, body), asked);
   if (status < 200 || (status >= 300 && status < 400))
-    return waits(Link::refused, told(status, body) +
-                                    ": no anchord answers so; is the address right, is there a login page?");
+    return waits(
+        Link::refused,
+        told(status, body) +
+            ": this is not the answer of an anchord server; is the address right, is there a login page?");
   return std::nullopt;
 }
 
@@ -121,22 +123,22 @@ Assessment assess(int status, const std::map<std::string, std::string>& headers,
       return waits(Link::refused,
                    "the answer is about " +
                        std::to_string(report->accepted + report->duplicates + report->rejected) +
-                       " rows, sent were " + std::to_string(n_rows));
+                       " rows, but the number sent was " + std::to_string(n_rows));
     }
     if (status < 300)
       return waits(Link::refused,
-                   told(status, body) + ": not the answer of an anchord; is there a login page?");
+                   told(status, body) + ": not the answer of an anchord server; is there a login page?");
   }
   if (status == 409 || status == 413) return {Then::halve, Link::up, told(status, body), std::nullopt, {}};
   if (status == 404 || status == 410) return {Then::hold, Link::up, told(status, body), std::nullopt, {}};
-  return waits(Link::refused, told(status, body) + ": is the server's anchord older than this one?");
+  return waits(Link::refused, told(status, body) + ": is the server older than this gateway?");
 }
 
 Assessment assess_question(int status, const std::map<std::string, std::string>& headers,
                            std::string_view body, UtcTime now) {
   if (auto trouble = assess_trouble(status, headers, body, now)) return *std::move(trouble);
   if (status < 300) return {Then::settled, Link::up, {}, std::nullopt, {}};
-  return waits(Link::refused, told(status, body) + ": is this the address of an anchord?");
+  return waits(Link::refused, told(status, body) + ": is this the address of an anchord server?");
 }
 
 milliseconds Pauses::next(double uniform) {

@@ -43,7 +43,7 @@ Assessment Delivery::send(std::span<const Batch> batches) {
   if (!tally.rejected.empty()) {
     // Before they leave the outbox: killed between the two, a row is named twice and never lost.
     if (const auto written = rejected_.append(tally.rejected, clock_.now()); !written)
-      return stays(Link::up, "rejected rows cannot be written down: " + written.error().message);
+      return stays(Link::up, "rejected rows cannot be written to the file: " + written.error().message);
   }
   Delivered delivered{{},
                       tally.accepted,

@@ -84,9 +84,10 @@ class StatusPages final : public server::Gateway {
     server::Admission admission;
     admission.route = known(request.path) ? request.path : "none";
     if (request.method != api::Method::get)
-      admission.refusal = problem(405, "method", "only GET is answered here").header("Allow", "GET");
+      admission.refusal = problem(405, "method", "only GET is supported here").header("Allow", "GET");
     else if (!known(request.path))
-      admission.refusal = problem(404, "not-found", "there are /status, /healthz, /readyz and /metrics");
+      admission.refusal =
+          problem(404, "not-found", "the addresses are /status, /healthz, /readyz and /metrics");
     else
       admission.run = [this](const api::Request& r) { return page(r.path); };
     return admission;
@@ -179,7 +180,7 @@ Result<void> FieldGateway::State::listen() {
   if (!loopback) {
     return make_error(
         Errc::invalid_argument,
-        "--listen " + options.listen + ": the status is for this machine alone, give 127.0.0.1:PORT");
+        "--listen " + options.listen + ": the status is served to this machine only: give 127.0.0.1:PORT");
   }
   pages = std::make_unique<StatusPages>([this] { return status(); }, [this] { return devices->metrics(); });
   pool = std::make_unique<server::WorkerPool>("anchord-status", 1, k_status_queue);

@@ -46,8 +46,9 @@ std::string text_of(std::span<const std::byte> bytes) {
 }
 
 Error not_an_outbox(const fs::path& file, const std::string& why) {
-  return make_error(Errc::unsupported,
-                    file.string() + " " + why + ": use another --data-dir, or the anchord that made it");
+  return make_error(
+      Errc::unsupported,
+      file.string() + " " + why + ": use another --data-dir, or the anchord version that created it");
 }
 
 /// No table yet: new, or killed before the tables were there.
@@ -66,14 +67,14 @@ Result<void> prepare(SqliteConnection& c, const fs::path& file) {
     c.execute("COMMIT");
     return sql::sync_path(file.parent_path());
   }
-  if (c.pragma("application_id") != k_application_id) return not_an_outbox(file, "is no outbox of a gateway");
+  if (c.pragma("application_id") != k_application_id)
+    return not_an_outbox(file, "is not the outbox of a gateway");
   if (c.pragma("user_version") != k_version) return not_an_outbox(file, "is of a newer anchord");
   const std::string found = c.check(false);
   if (found == "ok") return boost::outcome_v2::success();
-  return make_error(Errc::storage_unavailable,
-                    "the outbox " + file.string() + " is damaged (" + found +
-                        "): move it and its -wal aside and start again; 'anchord replay' makes its rows "
-                        "anew from the recordings beside it");
+  return make_error(Errc::storage_unavailable, "the outbox " + file.string() + " is damaged (" + found +
+                                                   "): move it and its -wal aside and start again; 'anchord "
+                                                   "replay' restores its rows from the recordings beside it");
 }
 
 Batch read_batch(Query& q) {
@@ -201,7 +202,7 @@ Result<std::unique_ptr<Outbox>> Outbox::open(const fs::path& dir, std::uint64_t 
   if (folder->had_database() || !folder->postgres().empty() || fs::exists(folder->database())) {
     return make_error(
         Errc::conflict,
-        dir.string() + " is the folder of a server: give the gateway one of its own by --data-dir");
+        dir.string() + " is the folder of a server: give the gateway a folder of its own with --data-dir");
   }
   const fs::path file = dir / "outbox.db";
   const bool fresh = !fs::exists(file) || fs::file_size(file) == 0;

@@ -75,7 +75,7 @@ class Sender::Impl {
     if (options_.mission) {
       BOOST_OUTCOME_TRY(const auto rows, outbox_.assign(*options_.mission));
       if (rows > 0)
-        options_.log(std::to_string(rows) + " rows without a mission are now of " +
+        options_.log(std::to_string(rows) + " rows without a mission now belong to " +
                      to_string(*options_.mission));
       return boost::outcome_v2::success();
     }
@@ -246,8 +246,8 @@ class Sender::Impl {
       // Rows may still be taken: the role gateway sends them and reads nothing.
       update([](auto& s) {
         s.mission_problem =
-            "which mission records cannot be asked: give the token the role viewer too, or name the mission "
-            "by --mission";
+            "the gateway may not read which mission is recording: use a token that also has the role viewer, "
+            "or give the mission with --mission";
       });
       ask_at_ = Monotonic::now() + k_ask_forbidden;
       return true;
@@ -284,17 +284,17 @@ class Sender::Impl {
     });
     if (news) {
       options_.record_into(mission);
-      options_.log(!mission ? std::string("no mission has the devices of the server: rows are not kept")
+      options_.log(!mission ? std::string("no mission has the devices of the server: rows are not stored")
                    : mission == unassigned()
-                       ? std::string("the server was not asked yet: rows are kept without a mission")
-                       : "rows are kept for mission " + to_string(*mission) + " (" +
+                       ? std::string("the server has not been asked yet: rows are stored without a mission")
+                       : "rows are stored for mission " + to_string(*mission) + " (" +
                              std::string(k_mission_from_words.word(from)) + ")");
     }
     if (from != MissionFrom::server || !mission) return;
     if (!news && Monotonic::now() < note_at_) return;
     note_at_ = Monotonic::now() + k_note_every;
     if (const auto noted = outbox_.note_mission({*mission, clock_.now()}); !noted)
-      options_.log("the mission cannot be noted: " + noted.error().message);
+      options_.log("the mission cannot be stored: " + noted.error().message);
   }
 
   // --- requests --------------------------------------------------------------------------------------------

@@ -36,51 +36,50 @@ std::optional<double> live_age_s(const Status& s) {
 void link_alarms(const Status& s, std::vector<Alarm>& out) {
   const auto link = s.sender.link;
   if (Sender::needs_a_person(link))
-    out.push_back({"gateway.refused", "the server takes no rows: " + s.sender.why + ". Everything is kept"});
+    out.push_back(
+        {"gateway.refused", "the server does not accept rows: " + s.sender.why + ". Everything is kept"});
   else if (link != Link::up && link != Link::unknown && s.link_s > k_link_alarm_s)
     out.push_back({"gateway.link", "no link to " + s.to + " for " + seconds_text(s.link_s) + ": " +
-                                       s.sender.why + ". Rows are kept and go when it is back"});
+                                       s.sender.why + ". Rows are kept and sent when the link is back"});
   else if (link == Link::up && !s.sender.why.empty())
     out.push_back({"gateway.disk_write", s.sender.why});
   for (const auto& [mission, why] : s.sender.held)
     out.push_back({"gateway.mission_unknown", "rows of mission " + to_string(mission) +
-                                                  " wait, the server answers " + why +
+                                                  " are waiting, the server answers " + why +
                                                   ": restore the mission there, or import its bundle"});
 }
 
 void disk_alarms(const Status& s, std::vector<Alarm>& out) {
   if (!s.keep_failure.empty())
     out.push_back(
-        {"gateway.full", "rows are NOT kept: " + s.keep_failure +
-                             ". The newest wait in memory, then the oldest of those are lost; raw bytes are "
-                             "in the recording as long as the disk takes them"});
+        {"gateway.full", "rows are NOT stored: " + s.keep_failure +
+                             ". The newest rows wait in memory; when that is full, the oldest of them are "
+                             "lost. Raw bytes are recorded as long as the disk has space"});
   else if (static_cast<double>(s.outbox.bytes) > k_filling_share * static_cast<double>(s.outbox.max_bytes))
     out.push_back({"gateway.filling", "the outbox has " + mib(s.outbox.bytes) + " of " +
                                           mib(s.outbox.max_bytes) +
-                                          ": bring the link back, or raise --max-mib"});
+                                          ": restore the link, or increase --max-mib"});
   if (s.disk_free_bytes < k_little_disk_bytes)
     out.push_back({"gateway.disk", "the disk has " + mib(s.disk_free_bytes) + " left (limit " +
                                        mib(k_little_disk_bytes) + "): free some"});
   if (s.rows_dropped > 0)
-    out.push_back(
-        {"gateway.rows_lost", std::to_string(s.rows_dropped) +
-                                  " rows were lost while the outbox took none; 'anchord replay' makes them "
-                                  "anew from the recording"});
+    out.push_back({"gateway.rows_lost",
+                   std::to_string(s.rows_dropped) + " rows were lost while the outbox could not store them; "
+                                                    "'anchord replay' restores them from the recording"});
   if (!s.recorder_failure.empty())
     out.push_back({"gateway.recording", "raw bytes are not recorded: " + s.recorder_failure});
 }
 
 void mission_alarms(const Status& s, std::vector<Alarm>& out) {
   if (s.outbox.unassigned_rows > 0)
-    out.push_back(
-        {"gateway.no_mission", std::to_string(s.outbox.unassigned_rows) +
-                                   " rows wait for a mission: start again with --mission ID, the id of "
-                                   "the mission on the server that they belong to"});
+    out.push_back({"gateway.no_mission", std::to_string(s.outbox.unassigned_rows) +
+                                             " rows have no mission: restart the gateway with --mission ID, "
+                                             "the id of the mission on the server that they belong to"});
   if (!s.sender.mission_problem.empty()) out.push_back({"gateway.mission", s.sender.mission_problem});
   if (s.outbox.totals.rejected > 0)
-    out.push_back({"gateway.rows_rejected", "the server rejected " +
-                                                std::to_string(s.outbox.totals.rejected) +
-                                                " rows; each stands with its reason in " + s.rejected_file});
+    out.push_back(
+        {"gateway.rows_rejected", "the server rejected " + std::to_string(s.outbox.totals.rejected) +
+                                      " rows; each is written with its reason to " + s.rejected_file});
   if (!s.not_started.empty()) out.push_back({"device.not_started", s.not_started});
 }
 
@@ -170,28 +169,32 @@ std::string metrics_text(const Status& s) {
   const auto n = [](std::uint64_t value) { return static_cast<double>(value); };
   const auto& totals = s.outbox.totals;
   const std::array metrics{
-      Metric{"anchord_gateway_link_up", "gauge", "1 while the server takes rows",
+      Metric{"anchord_gateway_link_up", "gauge", "1 while the server accepts rows",
              s.sender.link == Link::up ? 1.0 : 0.0},
-      Metric{"anchord_gateway_outbox_rows", "gauge", "Rows that wait for the server", n(s.outbox.rows)},
-      Metric{"anchord_gateway_outbox_bytes", "gauge", "Their size on the disk", n(s.outbox.bytes)},
-      Metric{"anchord_gateway_outbox_max_bytes", "gauge", "Beyond it no row is kept", n(s.outbox.max_bytes)},
+      Metric{"anchord_gateway_outbox_rows", "gauge", "Rows waiting to be sent to the server",
+             n(s.outbox.rows)},
+      Metric{"anchord_gateway_outbox_bytes", "gauge", "Size of the waiting rows on the disk",
+             n(s.outbox.bytes)},
+      Metric{"anchord_gateway_outbox_max_bytes", "gauge", "Size of the outbox beyond which no row is stored",
+             n(s.outbox.max_bytes)},
       Metric{"anchord_gateway_live_age_seconds", "gauge",
-             "Age of the newest row the server has; 0 before the first", live_age_s(s).value_or(0)},
-      Metric{"anchord_gateway_bytes_per_second", "gauge", "Of the newest requests with rows",
+             "Age of the newest row that the server has; 0 before the first", live_age_s(s).value_or(0)},
+      Metric{"anchord_gateway_bytes_per_second", "gauge", "Duration of the newest requests with rows",
              s.sender.bytes_per_s},
-      Metric{"anchord_gateway_disk_free_bytes", "gauge", "Of the folder's disk", n(s.disk_free_bytes)},
-      Metric{"anchord_gateway_alarms", "gauge", "Alarms that stand", n(alarms_of(s).size())},
-      Metric{"anchord_gateway_rows_kept_total", "counter", "Rows that reached the outbox", n(totals.kept)},
+      Metric{"anchord_gateway_disk_free_bytes", "gauge", "Free space on the disk of the data folder",
+             n(s.disk_free_bytes)},
+      Metric{"anchord_gateway_alarms", "gauge", "Active alarms", n(alarms_of(s).size())},
+      Metric{"anchord_gateway_rows_kept_total", "counter", "Rows written to the outbox", n(totals.kept)},
       Metric{"anchord_gateway_rows_accepted_total", "counter", "Rows that the server stored",
              n(totals.accepted)},
-      Metric{"anchord_gateway_rows_duplicate_total", "counter", "Rows that the server had already",
+      Metric{"anchord_gateway_rows_duplicate_total", "counter", "Rows that the server already had",
              n(totals.duplicates)},
-      Metric{"anchord_gateway_rows_rejected_total", "counter", "Rows that the server did not take",
+      Metric{"anchord_gateway_rows_rejected_total", "counter", "Rows that the server rejected",
              n(totals.rejected)},
-      Metric{"anchord_gateway_rows_lost_total", "counter", "Rows that the outbox did not take in time",
-             n(s.rows_dropped)},
+      Metric{"anchord_gateway_rows_lost_total", "counter",
+             "Rows that were lost because the outbox could not store them in time", n(s.rows_dropped)},
       Metric{"anchord_gateway_requests_total", "counter", "Requests to the server", n(s.sender.requests)},
-      Metric{"anchord_gateway_sent_bytes_total", "counter", "Bodies sent and answered",
+      Metric{"anchord_gateway_sent_bytes_total", "counter", "Bytes of request bodies sent and answered",
              n(s.sender.bytes_sent)}};
   std::string out;
   for (const auto& m : metrics) {

@@ -31,7 +31,7 @@ ConnectionBook::Entry ConnectionBook::admit(State& state, const std::string& add
   if (!many && own.sockets >= per_address_) {
     entry.evict = oldest_of(state, address);
     if (!entry.evict) {
-      entry.why = "all " + std::to_string(per_address_) + " connections of one address are at work";
+      entry.why = "all " + std::to_string(per_address_) + " connections of one address are in use";
       return entry;
     }
   } else if (state.sockets >= all_) {
@@ -47,7 +47,7 @@ ConnectionBook::Entry ConnectionBook::admit(State& state, const std::string& add
     if (most != nullptr) entry.evict = oldest_of(state, std::string(*most));
     if (!entry.evict) {
       if (own.sockets == 0) state.addresses.erase(address);
-      entry.why = "all " + std::to_string(all_) + " connections are at work";
+      entry.why = "all " + std::to_string(all_) + " connections are in use";
       return entry;
     }
   }

@@ -15,11 +15,11 @@ std::string why(httplib::Error error, const std::string& origin) {
   switch (error) {
     case httplib::Error::Connection:
     case httplib::Error::ConnectionTimeout:
-      return "cannot reach " + origin + ": does a server run there?";
+      return "cannot reach " + origin + ": is a server running there?";
     case httplib::Error::Read:
       return origin + " did not answer in time, or closed the connection";
     case httplib::Error::Write:
-      return origin + " closed the connection while the request was on its way";
+      return origin + " closed the connection during the request";
     case httplib::Error::SSLConnection:
     case httplib::Error::SSLLoadingCerts:
     case httplib::Error::SSLServerVerification:

@@ -296,7 +296,7 @@ class HttpSession final : public Connection, public std::enable_shared_from_this
   }
 
   api::Response overloaded() {
-    return context_->gateway.problem(503, "overloaded", "too many requests wait");
+    return context_->gateway.problem(503, "overloaded", "too many requests are waiting");
   }
 
   awaitable<void> run_handler(Admission& admission, api::Response& response) {
@@ -313,7 +313,7 @@ class HttpSession final : public Connection, public std::enable_shared_from_this
         response = context_->gateway.problem(
             429, "rate-limited",
             "this token has " + std::to_string(context_->heavy_shares.per_name()) +
-                " computations or large answers under way; wait for one of them to end");
+                " computations or large answers running; wait until one of them has ended");
         co_return;
       }
     }

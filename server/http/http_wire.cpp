@@ -17,7 +17,7 @@ constexpr std::size_t k_head_read_bytes = 4096;
 std::string speaks_https() {
   const std::string body =
       R"({"type":"/problems/malformed","title":"The request is not well-formed","status":400,)"
-      R"("detail":"this address speaks HTTPS: write https:// for it"})";
+      R"("detail":"this address uses HTTPS: write https://"})";
   return "HTTP/1.1 400 Bad Request\r\nContent-Type: application/problem+json\r\nContent-Length: " +
          std::to_string(body.size()) + "\r\nConnection: close\r\n\r\n" + body;
 }

@@ -119,7 +119,7 @@ std::optional<Refusal> validate_host(std::string_view host, const HostPolicy& po
   if (std::ranges::find(policy.hosts, name) == policy.hosts.end()) {
     // 421 would be the newer word; 400 is what every client treats as final.
     return Refusal{400, "malformed",
-                   "this server does not answer to the host name of the request; see allowed_hosts"};
+                   "the host name of the request is not allowed; see the setting allowed_hosts"};
   }
   return std::nullopt;
 }

@@ -71,7 +71,7 @@ std::optional<api::Response> static_file(const api::Request& request) {
   if (request.path != "/") return std::nullopt;
   api::Response response;
   response.header("Content-Type", "text/plain; charset=utf-8");
-  response.body = "anchord is running; it was built without the dashboard. The API is at /api/v1.\n";
+  response.body = "anchord is running; this build has no dashboard. The API is at /api/v1.\n";
   return response;
 }
 

@@ -103,10 +103,9 @@ class HttpPost final : public WebPost {
     std::string pinned;
     for (const auto& one : addresses) {
       if (!allow_private_ && !is_public_address(one))
-        return make_error(Errc::invalid_argument,
-                          url.host + " is " + one +
-                              ", an address of this machine or a private network: allow it with "
-                              "webhooks.allow_private");
+        return make_error(Errc::invalid_argument, url.host + " is " + one +
+                                                      ", an address of this machine or of a private network: "
+                                                      "to allow it, set webhooks.allow_private");
       if (pinned.empty()) pinned = one;
     }
     return exchange(url, pinned, message);
@@ -139,7 +138,7 @@ class HttpPost final : public WebPost {
     client.set_connection_timeout(k_step);
     client.set_read_timeout(k_step);
     client.set_write_timeout(k_step);
-    if (!enter(&client)) return make_error(Errc::canceled, "the server stops");
+    if (!enter(&client)) return make_error(Errc::canceled, "the server is stopping");
     const auto end = Steady::now() + k_whole;
     Answer answer;
     httplib::Request request;
@@ -160,8 +159,8 @@ class HttpPost final : public WebPost {
     // The head of an answer without a body is not handed on before.
     if (result) answer.status = result->status;
     if (answer.status != 0) return answer;  // perhaps its body was cut off
-    if (stopped) return make_error(Errc::canceled, "the server stops");
-    return make_error(Errc::link_lost, "no answer of " + url.host + " (" + pinned +
+    if (stopped) return make_error(Errc::canceled, "the server is stopping");
+    return make_error(Errc::link_lost, "no answer from " + url.host + " (" + pinned +
                                            "): " + httplib::to_string(result.error()));
   }
 

@@ -132,7 +132,7 @@ class WsSession final : public Connection, public std::enable_shared_from_this<W
   void refuse_close_code() {
     const auto code = static_cast<std::uint16_t>(ws_.reason().code);
     if (code < 5000 || !ws_.is_open() || std::exchange(closing_, true)) return;
-    const websocket::close_reason reason(websocket::close_code::protocol_error, "no such close code");
+    const websocket::close_reason reason(websocket::close_code::protocol_error, "invalid close code");
     ws_.async_close(reason, [self = shared_from_this()](const error_code&) {});
     if (ws_.is_open()) cut();  // a write is under way: ours would come after the echo
   }

@@ -186,7 +186,7 @@ class MqttBroker final : public Broker {
     const auto answer_by = Steady::now() + options_.answer;
     while (!stopped()) {
       if (!link.accepted && Steady::now() > answer_by)
-        return "no answer of the broker within " + std::to_string(options_.answer.count() / 1000) + " s";
+        return "no answer from the broker within " + std::to_string(options_.answer.count() / 1000) + " s";
       if (const int rc = step(link, link.accepted ? link.next : answer_by); rc != MOSQ_ERR_SUCCESS)
         return link.refused != 0
                    ? "refused by the broker: " + std::string(mosquitto_connack_string(link.refused))
@@ -204,7 +204,7 @@ class MqttBroker final : public Broker {
       }
     }
     if (link.accepted) farewell(link);
-    return "the server stops";
+    return "the server is stopping";
   }
 
   int publish(Link& link, const BrokerMessage& message) {

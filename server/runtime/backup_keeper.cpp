@@ -121,7 +121,7 @@ void BackupKeeper::drop_old() {
 
 Result<Backup> BackupKeeper::make() {
   const std::unique_lock lock(making_, std::try_to_lock);
-  if (!lock) return make_error(Errc::conflict, "a backup is being made");
+  if (!lock) return make_error(Errc::conflict, "a backup is already being made");
   std::error_code error;
   fs::create_directories(options_.dir, error);
   if (error) return make_error(Errc::storage_unavailable, options_.dir.string() + ": " + error.message());
@@ -129,8 +129,8 @@ Result<Backup> BackupKeeper::make() {
   const auto space = fs::space(options_.dir, error);
   const std::uint64_t needed = health.db_bytes + health.wal_bytes + (500ULL << 20);
   if (!error && space.available < needed)
-    return make_error(Errc::storage_full,
-                      "no backup: it would leave less than 500 MiB free in " + options_.dir.string());
+    return make_error(Errc::storage_full, "no backup was made: it would leave less than 500 MiB free in " +
+                                              options_.dir.string());
   const auto before = list();
   const UtcTime now = clock_.now();
   const std::uint64_t sequence = (before.empty() ? 0 : before.front().sequence) + 1;

@@ -150,15 +150,16 @@ Result<std::string> run_program(const std::vector<std::string>& command, std::st
   ::signal(SIGPIPE, before);
   if (said.more)
     return make_error(Errc::invalid_argument,
-                      command[0] + " made more than " + std::to_string(max_output >> 20) + " MiB");
+                      command[0] + " produced more than " + std::to_string(max_output >> 20) + " MiB");
   if (WIFSIGNALED(status) && WTERMSIG(status) == SIGXCPU)
     return make_error(Errc::no_convergence,
                       command[0] + " used up " + std::to_string(cpu_s) + " s of processor time");
   if (status != 0)
-    return make_error(Errc::bad_frame, command[0] + " failed (" +
-                                           (said.complaint.empty() ? "too large for its memory, or broken"
-                                                                   : last_line(said.complaint)) +
-                                           ')');
+    return make_error(Errc::bad_frame,
+                      command[0] + " failed (" +
+                          (said.complaint.empty() ? "the file is too large for its memory, or broken"
+                                                  : last_line(said.complaint)) +
+                          ')');
   return said.out;
 }
 

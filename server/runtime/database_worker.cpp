@@ -52,8 +52,9 @@ Result<void> work_for_database(const DatabaseWorkerOptions& options, const std::
       (void)work->seen(options.name, options.version).has_value();
     }
     const auto ran = runner.run_one(std::chrono::milliseconds(0), stopping);
-    if (!ran && !away) log(LogLevel::warning, "the database is away", {{"why", ran.error().message}});
-    if (ran && away) log(LogLevel::info, "the database is back");
+    if (!ran && !away)
+      log(LogLevel::warning, "the database cannot be reached", {{"why", ran.error().message}});
+    if (ran && away) log(LogLevel::info, "the database can be reached again");
     away = !ran;
     if (!ran || !ran.value()) pause(stopping);
   }

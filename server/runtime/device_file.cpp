@@ -25,10 +25,10 @@ std::string word(const Ordered& item, const char* key) {
 /// What in an entry cannot be what somebody set up; empty: nothing. Whether a driver takes its settings is
 /// seen when it is started.
 std::string fault_of(const Ordered& item) {
-  if (!item.is_object()) return "the entry is no object";
+  if (!item.is_object()) return "the entry is not an object";
   if (!parse_uuid(word(item, "id"))) return "id: not a UUID";
   for (const char* key : {"kind", "name", "address"}) {
-    if (!item.contains(key) || !item[key].is_string()) return std::string(key) + ": not a text";
+    if (!item.contains(key) || !item[key].is_string()) return std::string(key) + ": not a string";
   }
   if (item.contains("options") && !item["options"].is_object()) return "options: not an object";
   if (item.contains("enabled") && !item["enabled"].is_boolean()) return "enabled: not true or false";
@@ -104,8 +104,8 @@ Result<void> keep_unreadable(const fs::path& file) {
     if (!error) return boost::outcome_v2::success();
     break;
   }
-  return make_error(Errc::storage_unavailable,
-                    "cannot keep a copy of " + file.string() + ", so it is not replaced: " + error.message());
+  return make_error(Errc::storage_unavailable, "cannot store a copy of " + file.string() +
+                                                   ", so it is not replaced: " + error.message());
 }
 
 Result<void> write_devices(const fs::path& file, const std::vector<KeptDevice>& devices) {

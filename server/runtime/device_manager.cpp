@@ -103,7 +103,7 @@ class DeviceManager::Impl final : public device::DeviceListener {
     for (auto& device : devices) {
       if (!DeviceSecrets::drop_password_file(device.config) || !device.problem.empty()) continue;
       device.problem =
-          "password_file is not read any more, since it could be set over REST; send the password itself "
+          "password_file is no longer used, because it could be set over REST; send the password itself "
           "(options.password, or anchord devices settings DEVICE password_file=FILE)";
     }
     auto now = kept_.lock();
@@ -144,9 +144,9 @@ class DeviceManager::Impl final : public device::DeviceListener {
   std::string not_started() {
     const auto kept = kept_.lock();
     if (!kept->file_problem.empty()) {
-      return "the devices that are kept cannot be read: " + kept->file_problem +
-             "; repair the file and start the server again, or set the devices up anew "
-             "(a copy of the file is kept then)";
+      return "the stored devices cannot be read: " + kept->file_problem +
+             "; repair the file and restart the server, or set up the devices again (a copy of the file is "
+             "then kept)";
     }
     std::string out;
     for (const auto& [config, problem, entry] : kept->devices) {
@@ -194,7 +194,7 @@ class DeviceManager::Impl final : public device::DeviceListener {
     unstored_.stop();
     if (writer_.joinable()) writer_.join();
     for (auto& [id, promise] : answers_.exchange({}).waiting)
-      promise.set_value(make_error(Errc::canceled, "the server stops"));
+      promise.set_value(make_error(Errc::canceled, "the server is stopping"));
   }
 
   /// Runs a function on the io thread and gives back what it says.
@@ -235,7 +235,7 @@ class DeviceManager::Impl final : public device::DeviceListener {
   }
 
   Result<void> begin(const DeviceConfig& config) {
-    if (!loop_) return make_error(Errc::canceled, "the server stops");
+    if (!loop_) return make_error(Errc::canceled, "the server is stopping");
     Result<void> begun = boost::outcome_v2::success();
     const auto ran = guarded("start of device \"" + config.name + '"', [&] {
       if (!recorder_) open_recorder();
@@ -283,7 +283,7 @@ class DeviceManager::Impl final : public device::DeviceListener {
     while (unstored_.take(batch)) {
       if (batch.empty()) continue;
       for (int attempt = 1;; ++attempt) {
-        Result<void> done = make_error(Errc::internal, "the rows could not be taken");
+        Result<void> done = make_error(Errc::internal, "the rows could not be accepted");
         (void)guarded("rows of devices", [&] { done = rows_->store(batch); });
         if (done) break;
         if (attempt == 1) note("rows of devices are not stored: " + done.error().message);
@@ -409,7 +409,7 @@ Result<DeviceReport> DeviceManager::change(DeviceConfig config, std::uint64_t ex
     if (found == all->devices.end())
       return make_error(Errc::not_found, "there is no device " + to_string(config.id));
     if (found->config.version != expected_version)
-      return make_error(Errc::conflict, "the device was changed meanwhile");
+      return make_error(Errc::conflict, "the device was changed in the meantime");
     kept = *found;
     BOOST_OUTCOME_TRY(secret, DeviceSecrets::split(std::move(config), &kept.config));
     config = secret.config;
@@ -425,7 +425,7 @@ Result<DeviceReport> DeviceManager::change(DeviceConfig config, std::uint64_t ex
   if (!same_link) {
     const auto changed = impl_->on_io([&]() -> Result<void> {
       if (!stored) return stored.error();
-      if (!impl_->loop_) return make_error(Errc::canceled, "the server stops");
+      if (!impl_->loop_) return make_error(Errc::canceled, "the server is stopping");
       (void)impl_->loop_->remove(to_string(config.id));
       if (!config.enabled) return boost::outcome_v2::success();
       auto begun = impl_->begin(config);
@@ -454,7 +454,7 @@ Result<void> DeviceManager::remove(const Uuid& id, std::uint64_t expected_versio
     if (found == kept->devices.end())
       return make_error(Errc::not_found, "there is no device " + to_string(id));
     if (found->config.version != expected_version)
-      return make_error(Errc::conflict, "the device was changed meanwhile");
+      return make_error(Errc::conflict, "the device was changed in the meantime");
     kept->devices.erase(found);
   }
   impl_->on_io([&] {
@@ -479,7 +479,7 @@ Result<std::string> DeviceManager::act(const Uuid& id, std::string_view action,
     answers->waiting.erase(number);
   };
   const auto begun = impl_->on_io([&]() -> Result<void> {
-    if (!impl_->loop_) return make_error(Errc::canceled, "the server stops");
+    if (!impl_->loop_) return make_error(Errc::canceled, "the server is stopping");
     return impl_->loop_->command(to_string(id), {number, std::string(action), std::string(arguments_json)});
   });
   if (!begun) {
@@ -556,20 +556,21 @@ std::string DeviceManager::metrics() {
     out += std::string("# HELP ") + name + " " + help + "\n# TYPE " + name + " " + type + "\n";
     for (const auto& d : all) out += name + label(d) + "} " + std::to_string(value(d)) + "\n";
   };
-  family("anchord_device_talking", "gauge", "1 while good frames come",
+  family("anchord_device_talking", "gauge", "1 while valid frames are received",
          [](const DeviceReport& d) { return d.state == "talking" ? 1 : 0; });
   family("anchord_device_received_bytes_total", "counter", "Bytes received",
          [](const auto& d) { return d.bytes_in; });
   family("anchord_device_sent_bytes_total", "counter", "Bytes sent",
          [](const auto& d) { return d.bytes_out; });
-  family("anchord_device_frames_total", "counter", "Reads that held a good frame",
+  family("anchord_device_frames_total", "counter", "Reads with a valid frame",
          [](const auto& d) { return d.frames; });
   family("anchord_device_fixes_total", "counter", "Positions decoded", [](const auto& d) { return d.fixes; });
   family("anchord_device_ranges_total", "counter", "Ranges decoded", [](const auto& d) { return d.ranges; });
   family("anchord_device_lost_total", "counter", "Links that were lost",
          [](const auto& d) { return d.lost; });
   out +=
-      "# HELP anchord_device_dropped_total What was not used, by reason\n# TYPE anchord_device_dropped_total "
+      "# HELP anchord_device_dropped_total Data that was not used, by reason\n# TYPE "
+      "anchord_device_dropped_total "
       "counter\n";
   for (const auto& d : all) {
     for (const auto& [reason, n] : d.dropped) {
@@ -578,7 +579,8 @@ std::string DeviceManager::metrics() {
     }
   }
   out +=
-      "# HELP anchord_device_rows_lost_total Rows that the database did not take in time\n"
+      "# HELP anchord_device_rows_lost_total Rows that were lost because the database did not store them in "
+      "time\n"
       "# TYPE anchord_device_rows_lost_total counter\nanchord_device_rows_lost_total " +
       std::to_string(rows_lost()) + "\n";
   return out;

@@ -33,8 +33,9 @@ Result<DeviceSecrets::Change> DeviceSecrets::split(DeviceConfig config, const De
     change.password = given->get<std::string>();
     set = !change.password.empty();
   } else if (set && (before->address != config.address || before->kind != config.kind)) {
-    return make_error(Errc::invalid_argument, "password: it belongs to " + before->address +
-                                                  "; send it again with the new address, or an empty one");
+    return make_error(Errc::invalid_argument,
+                      "password: the stored one belongs to " + before->address +
+                          "; send the password again with the new address, or an empty one");
   }
   options.erase("password");
   options.erase("password_set");

@@ -106,7 +106,8 @@ int worker_main() {
   settle_in(server);
   std::string message;
   if (read_frame(k_socket, message, -1) != FrameRead::frame) {
-    std::fputs("anchord worker: without --database this is the process that a server starts by itself\n", stderr);
+    std::fputs("anchord worker: without --database this is the process that a server starts by itself\n",
+               stderr);
     return 2;
   }
   settle_for(message);
@@ -149,18 +150,18 @@ int worker_main() {
     } catch (const std::bad_alloc&) {
       message.clear();
       message.shrink_to_fit();  // room for the answer
-      result = plan ? make_error(Errc::invalid_argument, "the picture needs more memory than the " +
-                                                             allowed_memory() +
-                                                             " a worker may take: save it smaller")
-                    : make_error(Errc::unsupported,
-                                 "the training needs more memory than the " + allowed_memory() +
-                                     " a worker may take: use a data set of means or medians, fewer "
-                                     "rows, features or trees, and start the run again");
+      result =
+          plan ? make_error(Errc::invalid_argument, "the picture needs more memory than the " +
+                                                        allowed_memory() + " a worker may use: scale it down")
+               : make_error(Errc::unsupported,
+                            "the training needs more memory than the " + allowed_memory() +
+                                " a worker may use: use a data set of means or medians, fewer "
+                                "rows, features or trees, and start the run again");
     }
   });
   if (!ran) {
-    result = make_error(Errc::link_lost, "the worker failed: " + ran.what +
-                                             (plan ? "" : "; the run, its rows and settings are kept"));
+    result = make_error(Errc::link_lost, "the worker process failed: " + ran.what +
+                                             (plan ? "" : "; the run, its data and settings are kept"));
   }
   if (result)
     send({{"op", "done"}}, &result.value());  // as it is: pictures are no text

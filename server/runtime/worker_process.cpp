@@ -48,15 +48,16 @@ std::string cause_of(int signal, bool plan) {
   if (plan) return "a fault of the decoder or too little memory";
   switch (signal) {
     case SIGKILL:
-      return "most often the machine had no memory left; free some, or train on fewer rows or a smaller "
+      return "usually because the machine had no memory left; free some memory, or train on fewer rows or a "
+             "smaller "
              "grid, "
              "and start the run again";
     case SIGXCPU:
       return "it had used its 24 hours of processor time; train on fewer rows or a smaller grid";
     default:
-      return "a fault of the trainer or too little memory; the run, its rows and settings are kept: try "
+      return "a fault of the trainer or too little memory; the run, its data and settings are kept: try "
              "fewer "
-             "rows or another method, and report it";
+             "rows or another method, and report the fault";
   }
 }
 
@@ -81,11 +82,11 @@ class Child {
     if (WIFSIGNALED(status) && WTERMSIG(status) == SIGXCPU && plan_cpu_s_) return api::too_busy(*plan_cpu_s_);
     if (WIFSIGNALED(status))
       return make_error(Errc::link_lost,
-                        "the worker was ended by signal " + std::to_string(WTERMSIG(status)) + " (" +
+                        "the worker process was ended by signal " + std::to_string(WTERMSIG(status)) + " (" +
                             strsignal(WTERMSIG(status)) +
                             "): " + cause_of(WTERMSIG(status), plan_cpu_s_.has_value()) + when);
-    return make_error(Errc::link_lost, "the worker ended with code " + std::to_string(WEXITSTATUS(status)) +
-                                           " without an answer" + when);
+    return make_error(Errc::link_lost, "the worker process ended with code " +
+                                           std::to_string(WEXITSTATUS(status)) + " without an answer" + when);
   }
 
  private:
@@ -120,7 +121,7 @@ Result<pid_t> spawn(const std::filesystem::path& program, int socket) {
   posix_spawn_file_actions_destroy(&actions);
   posix_spawnattr_destroy(&attributes);
   if (failed != 0)
-    return make_error(Errc::internal, std::string("cannot start a worker: ") + std::strerror(failed));
+    return make_error(Errc::internal, std::string("cannot start a worker process: ") + std::strerror(failed));
   return pid;
 }
 
@@ -137,7 +138,7 @@ std::optional<api::WorkProgress> progress_of(const Json& j) {
 }
 
 Error unreadable(const std::string& what) {
-  return make_error(Errc::internal, "the worker's message cannot be read: " + what);
+  return make_error(Errc::internal, "the message of the worker process cannot be read: " + what);
 }
 
 /// A word that this version does not know is an error of its own: what it meant is not guessed.
@@ -151,7 +152,7 @@ Result<std::string> run(const std::filesystem::path& program, const std::string&
                         const api::WorkProgressSink& progress, const std::function<bool()>& canceled) {
   int ends[2];
   if (::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends) != 0)
-    return make_error(Errc::internal, std::string("cannot start a worker: ") + std::strerror(errno));
+    return make_error(Errc::internal, std::string("cannot start a worker process: ") + std::strerror(errno));
   Socket ours(ends[0]), theirs(ends[1]);
   BOOST_OUTCOME_TRY(const auto pid, spawn(program, theirs.fd()));
   Child child(pid, api::is_plan_work(message) ? std::optional(api::plan_work_cpu_s(message)) : std::nullopt);

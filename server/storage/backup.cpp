@@ -118,14 +118,14 @@ Result<void> check_backup(const fs::path& backup) {
     BOOST_OUTCOME_TRY(const auto found, sql::sha256_of_file(backup));
     if (found != expected)
       return make_error(Errc::unsupported,
-                        backup.string() + " is not what was backed up: its SHA-256 differs");
+                        backup.string() + " is not the file that was backed up: its SHA-256 differs");
   }
   try {
     sql::SqliteConnection copy(backup, sql::SqliteConnection::Mode::inspect, Synchronous::full, std::nullopt);
     if (copy.pragma("application_id") != sql::k_application_id)
       return make_error(Errc::unsupported, backup.string() + " is not an anchord database");
     if (copy.pragma("user_version") > newest_schema_version())
-      return make_error(Errc::unsupported, backup.string() + " was made by a newer anchord");
+      return make_error(Errc::unsupported, backup.string() + " was created by a newer anchord");
     if (const auto found = copy.check(true); found != "ok")
       return make_error(Errc::unsupported, backup.string() + " is damaged: " + found);
   } catch (const std::exception& fault) {
@@ -161,13 +161,13 @@ Result<std::optional<fs::path>> restore_backup(const fs::path& data_dir, const f
       if (!fs::exists(folder->database().string() + part, error)) continue;
       fs::rename(folder->database().string() + part, place.string() + part, error);
       if (error)
-        return make_error(Errc::storage_unavailable, "cannot put the old database aside: " + error.message());
+        return make_error(Errc::storage_unavailable, "cannot move the old database away: " + error.message());
     }
     old = place;
   }
   fs::rename(fresh, folder->database(), error);
   if (error)
-    return make_error(Errc::storage_unavailable, "cannot put the backup in place: " + error.message());
+    return make_error(Errc::storage_unavailable, "cannot copy the backup into place: " + error.message());
   BOOST_OUTCOME_TRYV(folder->note_database());
   BOOST_OUTCOME_TRYV(sql::sync_path(folder->dir()));
   return old;

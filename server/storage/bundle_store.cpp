@@ -222,8 +222,9 @@ class Reader {
     }
     fresh_ = !key_.has_value();
     if (!fresh_ && !mission_key(c_, mission_))
-      return make_error(Errc::conflict, "mission " + to_string(mission_) +
-                                            " is in the bin here: restore it, or remove it for good");
+      return make_error(Errc::conflict,
+                        "mission " + to_string(mission_) +
+                            " is in the bin of this server: restore it, or remove it permanently");
     BOOST_OUTCOME_TRY(leave_out_calibrations());
     BOOST_OUTCOME_TRY(leave_out_revisions());
     BOOST_OUTCOME_TRY(leave_out_profiles());
@@ -251,9 +252,10 @@ class Reader {
       const MissionId mission{uuid_of(row[2])};
       if (mission == mission_ || mission_key(c_, mission)) continue;
       if (calibrations_out_.insert(calibration).second)
-        out_.left_out.push_back({"calibration " + to_string(calibration),
-                                 "it was made with mission " + to_string(mission) +
-                                     " too, which is not here: import that one's bundle, then this again"});
+        out_.left_out.push_back(
+            {"calibration " + to_string(calibration), "it was made with mission " + to_string(mission) +
+                                                          " too, which is not on this server: import the "
+                                                          "bundle of that mission, then this one again"});
     }
   }
 
@@ -288,8 +290,8 @@ class Reader {
       out_.left_out.push_back(
           {"revision " + std::to_string(number),
            others ? "this server has published revisions of its own: publish the calibration here"
-                  : "it rests on revisions or calibrations that did not come along: publish the calibration "
-                    "here"});
+                  : "it is based on revisions or calibrations that are not in the bundle: publish the "
+                    "calibration here"});
     return boost::outcome_v2::success();
   }
 
@@ -304,7 +306,7 @@ class Reader {
       if (!more) return boost::outcome_v2::success();
       const auto here = stored(spec, row);
       if (!here || differing(spec, *here, row).empty() || !profiles_out_.insert(row[0]).second) continue;
-      out_.left_out.push_back({name_of(spec, row), "this server has learned another profile of the kit"});
+      out_.left_out.push_back({name_of(spec, row), "this server has another profile of the kit"});
     }
   }
 
@@ -322,7 +324,7 @@ class Reader {
     }
     if (spec.part == BundlePart::mission && counted.n_rows != 1)
       return make_error(Errc::invalid_argument,
-                        "a bundle has one mission, this one " + std::to_string(counted.n_rows));
+                        "a bundle must have one mission, this one has " + std::to_string(counted.n_rows));
     if (spec.part == BundlePart::measured && !fresh_) {
       BOOST_OUTCOME_TRY(same_count(spec, counted.n_rows));
     }
@@ -351,14 +353,14 @@ class Reader {
         return false;
       }
       if (spec.part == BundlePart::measured)
-        return make_error(Errc::conflict, "mission " + to_string(mission_) + " is here without " +
-                                              name_of(spec, row) +
-                                              " of the bundle: it is another flight of the same id");
+        return make_error(Errc::conflict, "mission " + to_string(mission_) +
+                                              " exists on this server without " + name_of(spec, row) +
+                                              " of the bundle: it is another flight with the same id");
     }
     if (spec.table.name == "local_frame" && frame_named(row[1])) {
-      out_.left_out.push_back(
-          {name_of(spec, row),
-           "another frame is called " + in_words(row[1], spec.table.columns[1]) + " here, and stays"});
+      out_.left_out.push_back({name_of(spec, row), "another frame has the name " +
+                                                       in_words(row[1], spec.table.columns[1]) +
+                                                       " on this server, and stays"});
       return false;
     }
     BOOST_OUTCOME_TRY(add(spec, row));
@@ -367,14 +369,15 @@ class Reader {
 
   Result<void> check_mission(const BundleSpec& spec, const BundleRow& row) const {
     if (uuid_of(row[0]) != mission_.uuid)
-      return make_error(Errc::invalid_argument,
-                        "the bundle is of mission " + to_string(mission_) + ", its row of another");
+      return make_error(Errc::invalid_argument, "the bundle is of mission " + to_string(mission_) +
+                                                    ", but its row is of another one");
     const auto cell = [&](const char* name) -> const BundleCell& {
       const auto at = std::ranges::find(spec.columns, name, &BundleColumnSql::bundle);
       return row[static_cast<std::size_t>(at - spec.columns.begin())];
     };
     if (whole_of(cell("state")) == static_cast<std::int64_t>(MissionState::recording))
-      return make_error(Errc::invalid_argument, "the mission of a bundle is finished, this one records");
+      return make_error(Errc::invalid_argument,
+                        "the mission of a bundle must be finished, this one is recording");
     const auto* sigma_m = std::get_if<double>(&cell("lever_arm_sigma_m"));
     if (sigma_m != nullptr && !is_lever_arm_sigma(*sigma_m))
       return make_error(Errc::invalid_argument,
@@ -414,10 +417,11 @@ class Reader {
   Result<void> stays(const BundleSpec& spec, const BundleRow& row, const std::string& column) {
     const std::string what = name_of(spec, row);
     if (!is_edited(spec.part))
-      return make_error(Errc::conflict,
-                        what + " is here with other content (" + column + "); nothing was imported");
+      return make_error(Errc::conflict, what + " exists on this server with other content (" + column +
+                                            "); nothing was imported");
     if (spec.table.name == "anchor") anchors_out_.insert(row[0]);
-    out_.left_out.push_back({what, "it is here with other content (" + column + "), which stays"});
+    out_.left_out.push_back(
+        {what, "it exists on this server with other content (" + column + "), which stays"});
     return boost::outcome_v2::success();
   }
 
@@ -440,8 +444,8 @@ class Reader {
         query.run();
     } catch (const SqlError& error) {
       if (error.failure() != Failure::constraint) throw;
-      return make_error(Errc::conflict, name_of(spec, row) + " cannot stand here (" + error.what() +
-                                            "); nothing was imported");
+      return make_error(Errc::conflict, name_of(spec, row) + " cannot be stored on this server (" +
+                                            error.what() + "); nothing was imported");
     }
     return boost::outcome_v2::success();
   }
@@ -459,7 +463,7 @@ class Reader {
     query << key_.value();
     const std::uint64_t here = query.step() ? query.as<std::uint64_t>() : 0;
     if (here == n_rows) return boost::outcome_v2::success();
-    return make_error(Errc::conflict, "mission " + to_string(mission_) + " is here with " +
+    return make_error(Errc::conflict, "mission " + to_string(mission_) + " exists on this server with " +
                                           std::to_string(here) + " rows of " + spec.table.name + ", not " +
                                           std::to_string(n_rows) + "; nothing was imported");
   }
@@ -494,7 +498,8 @@ class SqlBundleStore final : public BundleStore {
       Query query(c, k_mission_state);
       query << *key;
       if (query.step() && query.one_of(k_mission_state_words) == MissionState::recording)
-        return make_error(Errc::conflict, query.text() + " records: finish it first, then take its bundle");
+        return make_error(Errc::conflict,
+                          query.text() + " is recording: finish it first, then take its bundle");
       return Writer(c, *key, sink).run();
     });
     if (error) return *error;

@@ -208,10 +208,10 @@ Result<Revision> publish_revision(Connection& c, const CalibrationId& id,
   const std::uint64_t before = newest_revision(c);
   if (decided_on && *decided_on != before)
     return make_error(Errc::conflict, "revision " + std::to_string(before) +
-                                          " was published meanwhile: read the anchors again");
+                                          " was published in the meantime: read the anchors again");
   if (all_stand(c, before, *key, anchors))
     return make_error(Errc::conflict, "revision " + std::to_string(before) +
-                                          " has these positions of calibration " + to_string(id) +
+                                          " already has these positions of calibration " + to_string(id) +
                                           " already");
   const Revision revision{before + 1, id, now, std::string(by), std::string(note)};
   Query insert(c, k_insert_revision);

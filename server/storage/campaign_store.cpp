@@ -202,7 +202,7 @@ class SqlCampaignStore final : public CampaignStore {
           at = known.try_emplace(truth.setting, insert_setting(c, *key, truth), truth).first;
         } else if (!same_truth(at->second.second, truth)) {
           return make_error(Errc::conflict, "row " + std::to_string(i + 1) + ": setting " + truth.setting +
-                                                " exists with another truth");
+                                                " exists with other true values");
         }
         ++(insert_sample(c, at->second.first, rows[i].sample) ? done.accepted : done.duplicates);
       }

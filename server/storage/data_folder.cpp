@@ -134,8 +134,8 @@ void DataFolder::forget_database() {
 Result<void> DataFolder::check_rows_are_here() const {
   const std::string there = postgres();
   if (there.empty()) return boost::outcome_v2::success();
-  return make_error(Errc::unsupported, "the rows of data folder " + dir_.string() + " are in " + there +
-                                           ": name it with --database, or name another folder");
+  return make_error(Errc::unsupported, "the database of data folder " + dir_.string() + " are in " + there +
+                                           ": give it with --database, or give another folder");
 }
 
 std::uint64_t DataFolder::free_bytes() const {
@@ -174,15 +174,14 @@ std::string DataFolder::recovery_commands() const {
         "\n  anchord backup restore " + shell_quoted(it->path()) + " --data-dir " + shell_quoted(dir_);
   }
   if (!saved_copies.empty())
-    return "What was stored when the file was taken away from a running server is beside it. To put it "
-           "back:" +
+    return "What was stored when the file was removed under a running server is in a copy beside it. To "
+           "restore it:" +
            saved_copies;
   const std::string db = shell_quoted(database());
   const std::string recovered = shell_quoted(dir_ / "recovered.db");
   const std::string saved = shell_quoted(dir_.string() + ".damaged");
-  return "Nothing was changed. Stop every anchord, then keep a copy of all files, and either save what can "
-         "be read or go "
-         "back to the newest copy:\n"
+  return "Nothing was changed. Stop every anchord, then make a copy of all files, and either save what can "
+         "be read or restore the newest backup:\n"
          "  cp -a " +
          shell_quoted(dir_) + " " + saved +
          "\n"

@@ -75,15 +75,15 @@ Result<void> ready(Place& to, const std::string& source, const std::vector<RowTa
     const std::string before = begun.step() ? begun.text() : "";
     if (before == source) return boost::outcome_v2::success();
     return make_error(Errc::conflict, "a copy from " + before + " into " + to.shown +
-                                          " was not finished: finish that one, or give a new database");
+                                          " was interrupted: finish that one, or give a new database");
   }
   for (const RowTable& table : tables) {
     if (table.name == k_seeded) continue;
     if (const auto rows = sql::count_rows(c, table); rows > 0) {
-      return make_error(Errc::conflict, to.shown + " has rows already (" + std::to_string(rows) + " in " +
+      return make_error(Errc::conflict, to.shown + " already has rows (" + std::to_string(rows) + " in " +
                                             table.name + "): a copy goes into an empty database; " +
-                                            (to.postgres() ? "make one with createdb"
-                                                           : "name a folder that does not exist yet"));
+                                            (to.postgres() ? "create one with createdb"
+                                                           : "give a folder that does not exist yet"));
     }
   }
   to.begin_writing();
@@ -106,7 +106,7 @@ Result<void> copy_table(Place& from, Place& to, const RowTable& table, const Cop
     to.connection->execute("COMMIT");
     rows += page.size();
     if (progress(table.name, rows)) continue;
-    return make_error(Errc::canceled, "the copy was ended; the same command goes on where it was");
+    return make_error(Errc::canceled, "the copy was stopped; the same command continues it");
   }
   return boost::outcome_v2::success();
 }
@@ -142,7 +142,7 @@ Result<std::vector<sql::TableDigest>> copy_rows(Place& from, Place& to, const Co
     return make_error(Errc::conflict, "table " + expected[i].table + " differs after the copy (" +
                                           std::to_string(expected[i].rows) + " rows, there " +
                                           std::to_string(found[i].rows) + "): " + from.shown +
-                                          " was changed meanwhile; begin again with a new database");
+                                          " was changed in the meantime; start again with a new database");
   }
   to.connection->execute("DROP TABLE unfinished_copy");
   return expected;
@@ -180,7 +180,7 @@ Result<std::vector<sql::TableDigest>> copy_database(const std::string& from, con
   return without_throwing([&]() -> Result<std::vector<sql::TableDigest>> {
     BOOST_OUTCOME_TRY(auto source, open_place(from));
     if (source.unfinished())
-      return make_error(Errc::unsupported, "a copy into " + source.shown + " has not come to its end");
+      return make_error(Errc::unsupported, "a copy into " + source.shown + " has not been finished");
     BOOST_OUTCOME_TRY(auto target, open_place(to, true));
     return copy_rows(source, target, progress);
   });
@@ -190,8 +190,8 @@ Result<void> sql::check_copy_is_whole(Connection& connection, const char* exists
   Query query(connection, exists);
   if (!query.step() || query.integer() == 0) return boost::outcome_v2::success();
   return make_error(Errc::unsupported,
-                    "a copy into this database has not come to its end: give 'anchord database copy' again, "
-                    "or make a new database");
+                    "a copy into this database has not been finished: run 'anchord database copy' again, or "
+                    "create a new database");
 }
 
 }  // namespace anchord

@@ -99,7 +99,7 @@ class SqlDatasetStore final : public DatasetStore {
       Query runs(c, k_runs);
       runs << id;
       if (runs.step() && runs.integer() > 0)
-        return make_error(Errc::conflict, "training runs used this data set; remove them first");
+        return make_error(Errc::conflict, "training runs have used this data set; remove them first");
       Query query(c, k_remove);
       query << id;
       if (query.returned()) return std::nullopt;

@@ -97,7 +97,7 @@ class SqlExclusionStore final : public ExclusionStore {
       const auto twice = std::ranges::unique(e.selection.rows);
       e.selection.rows.erase(twice.begin(), twice.end());
       e.n_rows = e.selection.rows.empty() ? count(c, *mission, e.selection) : e.selection.rows.size();
-      if (e.n_rows == 0) return no_row(e, "within what is selected");
+      if (e.n_rows == 0) return no_row(e, "in the selection");
       const auto& s = e.selection;
       Query query(c, k_insert);
       query << e.id << *mission << static_cast<int>(s.kind) << s.since << s.until << s.anchor << s.tag

@@ -55,7 +55,7 @@ class SqlFrameStore final : public FrameStore {
       bind(query, frame, expected_version + 1);
       query << expected_version;
       if (query.returned()) return std::nullopt;
-      return make_error(Errc::conflict, "the frame was changed in between");
+      return make_error(Errc::conflict, "the frame was changed in the meantime");
     });
   }
   Result<LocalFrame> frame(const FrameId& id) override { return find("WHERE id = ?1", id); }
@@ -82,7 +82,7 @@ class SqlFrameStore final : public FrameStore {
       if (query.returned()) return std::nullopt;
       Query known(c, std::string(k_columns) + "WHERE id = ?1");
       known << id;
-      if (known.step()) return make_error(Errc::conflict, "the frame was changed in between");
+      if (known.step()) return make_error(Errc::conflict, "the frame was changed in the meantime");
       return absent("frame", id);
     });
   }

@@ -214,7 +214,7 @@ void add_table(SQLite::Database& db, const FeatureTable& table, const std::strin
 
 Error cannot_make(const SQLite::Exception& error) {
   return make_error(error.getErrorCode() == SQLITE_FULL ? Errc::storage_full : Errc::storage_unavailable,
-                    std::string("a GeoPackage could not be made: ") + error.what());
+                    std::string("a GeoPackage could not be created: ") + error.what());
 }
 
 class GeopackageFile final : public FeatureFile {

@@ -127,7 +127,7 @@ RowOutcome judge_stored(Connection& connection, std::int64_t key, const Row& row
                                   std::string(Table<Row>::same_identity);
   Query query(connection, text);
   Table<Row>::bind_identity(query, key, row);
-  if (!query.step()) throw SqlError(Failure::internal, "a row that was rejected as present is not there");
+  if (!query.step()) throw SqlError(Failure::internal, "a row that was rejected as existing does not exist");
   const std::int64_t id = query.integer();
   query.skip();
   Row stored = Table<Row>::read(query);
@@ -198,7 +198,7 @@ Result<std::optional<Cursor>> parse_cursor(const std::string& text) {
     const auto id = std::from_chars(time.ptr + 1, end, cursor.id);
     if (id.ec == std::errc{} && id.ptr == end) return std::optional(cursor);
   }
-  return make_error(Errc::invalid_argument, "not a cursor of ours: \"" + text + "\"");
+  return make_error(Errc::invalid_argument, "not a cursor of this server: \"" + text + "\"");
 }
 
 constexpr LimitColumns k_range_limits{"distance_m", "ifnull(rx_dbm, rss_dbm)", "truth_los"};
@@ -327,7 +327,8 @@ MissionId mission_id(Connection& connection, std::int64_t key) {
 }
 
 Error gone(const MissionId& id) {
-  return make_error(Errc::not_found, "no mission " + to_string(id) + ": it was deleted, or never was here");
+  return make_error(Errc::not_found,
+                    "no mission " + to_string(id) + ": it was deleted, or has never existed here");
 }
 
 template <class Row>

@@ -44,7 +44,8 @@ Result<void> verify_applied(SqliteConnection& connection, std::span<const Migrat
     if (digest != sha256_hex(migrations[static_cast<std::size_t>(number - 1)].sql)) {
       return make_error(Errc::unsupported,
                         "migration " + std::to_string(number) + " (" + name +
-                            ") was another one when this database was made: it had SHA-256 " + digest);
+                            ") is not the one with which this database was created: that one had SHA-256 " +
+                            digest);
     }
   }
   return boost::outcome_v2::success();
@@ -79,7 +80,7 @@ Result<void> migrate(SqliteConnection& connection, std::span<const Migration> mi
                      const std::filesystem::path& backup_dir, UtcTime now) {
   const std::int64_t version = connection.pragma("user_version");
   const auto newest = static_cast<std::int64_t>(migrations.size());
-  ANCHORD_CHECK(version <= newest, "a newer database came to migrate: " << version);
+  ANCHORD_CHECK(version <= newest, "the database to migrate is of a newer version: " << version);
   if (version > 0) {
     BOOST_OUTCOME_TRY(verify_applied(connection, migrations));
   }

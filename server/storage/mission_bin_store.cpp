@@ -55,7 +55,7 @@ class SqlMissionBin final : public MissionBin {
       if (!found.step()) return make_error(Errc::not_found, "no mission " + to_string(id));
       const std::int64_t key = found.integer();
       if (found.one_of(k_mission_state_words) == MissionState::recording)
-        return make_error(Errc::conflict, "mission " + to_string(id) + " records: finish it first");
+        return make_error(Errc::conflict, "mission " + to_string(id) + " is recording: finish it first");
       Query used(c, k_calibrations);
       used << key;
       const std::int64_t n = used.step() ? used.integer() : 0;
@@ -63,7 +63,7 @@ class SqlMissionBin final : public MissionBin {
         return make_error(Errc::conflict,
                           "mission " + to_string(id) + " is used by " + std::to_string(n) +
                               (n == 1 ? " calibration" : " calibrations") +
-                              ", whose positions rest on its measurements: delete those first");
+                              ", whose positions are based on its measurements: delete those first");
       }
       Query query(c, k_put);
       query << key << now << ran_ns << by;
@@ -130,7 +130,7 @@ class SqlMissionBin final : public MissionBin {
     if (!found.step()) return not_binned(id);
     const std::int64_t key = found.integer();
     if (found.integer() != 0 && !also_while_emptying)
-      return make_error(Errc::conflict, "mission " + to_string(id) + " is being removed for good");
+      return make_error(Errc::conflict, "mission " + to_string(id) + " is being removed permanently");
     Query query(c, text);
     query << key;
     query.run();

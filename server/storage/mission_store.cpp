@@ -147,7 +147,7 @@ class SqlMissionStore final : public MissionStore {
       query << id << now << static_cast<int>(MissionState::finished);
       const bool done = query.returned().has_value();
       auto mission = find(c, id);
-      if (mission && !done) return make_error(Errc::conflict, mission.value().name + " is finished already");
+      if (mission && !done) return make_error(Errc::conflict, mission.value().name + " is already finished");
       return mission;
     });
   }

@@ -111,7 +111,8 @@ class SqlModelStore final : public ModelStore {
       Query promoted(c, k_promoted);
       promoted << id;
       if (promoted.step() && promoted.integer() > 0)
-        return make_error(Errc::conflict, "model " + to_string(id) + " was promoted, and its record stays");
+        return make_error(Errc::conflict,
+                          "model " + to_string(id) + " has been promoted and cannot be deleted");
       Query query(c, k_remove);
       query << id;
       if (query.returned()) return std::nullopt;
@@ -125,7 +126,7 @@ class SqlModelStore final : public ModelStore {
       const std::uint64_t before = newest.step() ? newest.as<std::uint64_t>() : 0;
       if (decided_on && *decided_on != before)
         return make_error(Errc::conflict, "promotion " + std::to_string(before) +
-                                              " came meanwhile: read the active models again");
+                                              " was made in the meantime: read the active models again");
       if (promotion.model) {
         Query known(c, "SELECT task FROM model WHERE id = ?1");
         known << *promotion.model;

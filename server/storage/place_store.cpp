@@ -356,7 +356,7 @@ class SqlPlaceStore final : public PlaceStore {
 
  private:
   static Error changed_meanwhile() {
-    return make_error(Errc::conflict, "the floor was changed while its plan was sent: send it again");
+    return make_error(Errc::conflict, "the floor was changed while its plan was being sent: send it again");
   }
   static std::optional<Error> change_tiles(Connection& c, const Floor& f) {
     const PlanTilesId named = f.tiles ? f.tiles->id : PlanTilesId{};

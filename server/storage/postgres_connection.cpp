@@ -246,7 +246,7 @@ class PostgresStatement final : public Statement {
 /// Where a password was wanted: the message alone does not say where it is to be written.
 std::string password_advice(const PGconn* connection) {
   if (PQconnectionNeedsPassword(connection) == 0 && PQconnectionUsedPassword(connection) == 0) return {};
-  return "; the password is looked for in ~/.pgpass, or in the file (mode 0600) named by PGPASSFILE";
+  return "; the password is read from ~/.pgpass, or from the file (mode 0600) in PGPASSFILE";
 }
 
 /// Fewer rows are not worth a statement of arrays; more at once only cost memory.
@@ -313,7 +313,7 @@ PostgresConnection::PostgresConnection(const std::string& address)
   if (encoding == nullptr || std::string_view(encoding) != "UTF8")
     throw SqlError(Failure::unavailable,
                    where + "its encoding is " + (encoding == nullptr ? "?" : encoding) +
-                       "; make one with: createdb --encoding=UTF8 --template=template0");
+                       "; create one with: createdb --encoding=UTF8 --template=template0");
 }
 
 PostgresConnection::~PostgresConnection() {
@@ -435,7 +435,7 @@ void PostgresConnection::commit() {
   const Answer answer(PQexec(state_->get(), "COMMIT"));
   check(state_->get(), answer.get());
   if (std::string_view(PQcmdStatus(const_cast<PGresult*>(answer.get()))) != "COMMIT")
-    throw SqlError(Failure::internal, "database: the transaction was undone instead of committed");
+    throw SqlError(Failure::internal, "database: the transaction was rolled back instead of committed");
 }
 
 }  // namespace anchord::sql

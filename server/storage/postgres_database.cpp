@@ -68,7 +68,8 @@ class PostgresDatabase final : public Database {
           status.trouble->failure() == sql::Failure::full ? StorageLevel::full : StorageLevel::unavailable;
       health.reason = status.trouble->what();
     } else {
-      sql::note_stall(status.oldest_s, "its server, that server's disk or the network hangs", health);
+      sql::note_stall(status.oldest_s, "its server, the disk of that server or the network does not respond",
+                      health);
     }
     return health;
   }
@@ -136,11 +137,11 @@ Result<std::unique_ptr<Database>> open_postgres(const PostgresOptions& options) 
     BOOST_OUTCOME_TRYV(sql::check_copy_is_whole(connection, sql::k_unfinished_in_postgres));
     // Rows of a flight would seem to be gone.
     if (folder->had_database() && folder->postgres().empty() && !has_rows(connection)) {
-      return make_error(Errc::unsupported,
-                        "data folder " + options.data_dir.string() + " has a database of its own and " +
-                            sql::shown_address(options.address) +
-                            " is empty: copy the rows with 'anchord database copy', or name "
-                            "another --data-dir");
+      return make_error(
+          Errc::unsupported,
+          "data folder " + options.data_dir.string() + " has an SQLite database of its own and " +
+              sql::shown_address(options.address) +
+              " is empty: copy the rows with 'anchord database copy', or give another --data-dir");
     }
     BOOST_OUTCOME_TRYV(folder->note_postgres(sql::shown_address(options.address)));
     return std::unique_ptr<Database>(std::make_unique<PostgresDatabase>(options, std::move(folder)));

@@ -131,8 +131,8 @@ std::optional<Error> PostgresGate::enter(std::size_t rows, Since::const_iterator
   const bool too_many_rows = status.queued_rows > 0 && status.queued_rows + rows > limits_.max_rows;
   if (too_many_rows || status.queued_calls >= limits_.max_calls) {
     return make_error(Errc::queue_full,
-                      "too much waits to be written: " + std::to_string(status.queued_rows) + " rows in " +
-                          std::to_string(status.queued_calls) + " calls");
+                      "too many rows are waiting to be written: " + std::to_string(status.queued_rows) +
+                          " rows in " + std::to_string(status.queued_calls) + " calls");
   }
   status.queued_rows += rows;
   ++status.queued_calls;

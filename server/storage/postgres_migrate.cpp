@@ -28,7 +28,7 @@ Result<std::size_t> applied(PostgresConnection& connection, std::span<const Migr
   if (number(connection, k_has_versions) == 0) {
     if (number(connection, k_tables) == 0) return std::size_t{0};
     return make_error(Errc::unsupported,
-                      "the database has tables that are not anchord's: give it one of its own");
+                      "the database has tables of another program: use a database for anchord alone");
   }
   Query query(connection, k_applied);
   std::size_t n = 0;
@@ -41,12 +41,13 @@ Result<std::size_t> applied(PostgresConnection& connection, std::span<const Migr
     if (n <= migrations.size() && digest != sha256_hex(migrations[n - 1].sql)) {
       return make_error(Errc::unsupported,
                         "migration " + std::to_string(number) + " (" + name +
-                            ") was another one when this database was made: it had SHA-256 " + digest);
+                            ") is not the one with which this database was created: that one had SHA-256 " +
+                            digest);
     }
   }
   if (n > migrations.size()) {
     return make_error(Errc::unsupported, "the database has version " + std::to_string(n) +
-                                             "; this anchord knows up to " +
+                                             "; this anchord supports versions up to " +
                                              std::to_string(migrations.size()) + ". Use the newer anchord");
   }
   return n;

@@ -105,14 +105,14 @@ std::string shown_address(std::string_view address) {
 
 std::string address_fault(std::string_view address) {
   if (!address.starts_with("postgresql://") && !address.starts_with("postgres://"))
-    return "this is no address of PostgreSQL; write postgresql://user@host:5432/name";
+    return "this is not an address of PostgreSQL; write postgresql://user@host:5432/name";
   const auto rest = address.substr(address.find("://") + 3);
   const auto at = rest.rfind('@');
   const auto user = at == std::string_view::npos ? std::string_view{} : rest.substr(0, at);
   if (user.find(':') == std::string_view::npos && decoded(rest).find("password=") == std::string::npos)
     return {};
-  return "there is a password in it, which others can read; put it into ~/.pgpass, or into a file named by "
-         "PGPASSFILE";
+  return "it contains a password, which others could read; write the password to ~/.pgpass, or to a file "
+         "given in PGPASSFILE";
 }
 
 }  // namespace anchord::sql

@@ -128,7 +128,7 @@ std::vector<RowTable> row_tables() {
     const auto free = std::ranges::find_if(waiting, [&](const auto& one) {
       return std::ranges::none_of(named[one.first], [&](const auto& name) { return waiting.contains(name); });
     });
-    ANCHORD_CHECK(free != waiting.end(), "tables name each other in a circle");
+    ANCHORD_CHECK(free != waiting.end(), "tables reference each other in a circle");
     out.push_back(std::move(free->second));
     waiting.erase(free);
   }

@@ -102,9 +102,9 @@ class SqliteDatabase final : public Database, private sql::Gate {
   std::optional<Error> admit_mission() const {
     const std::uint64_t free = folder_->free_bytes();
     if (free >= options_.refuse_free_bytes) return std::nullopt;
-    return make_error(Errc::storage_full, "no new missions: " + mebibytes(free) + " free, " +
+    return make_error(Errc::storage_full, "no new missions can start: " + mebibytes(free) + " free, " +
                                               mebibytes(options_.refuse_free_bytes) +
-                                              " needed; a running one goes on");
+                                              " needed; a running one continues");
   }
 
   void assess(StorageHealth& health, const sql::WriteQueue::Status& status) const {
@@ -115,13 +115,14 @@ class SqliteDatabase final : public Database, private sql::Gate {
       health.reason = status.trouble->what();
     } else if (damage_found_) {
       health.level = StorageLevel::unavailable;
-      health.reason = "the check of the database found damage; see the log of the start";
-    } else if (sql::note_stall(status.oldest_s, "the disk hangs, or another program holds the database",
+      health.reason = "the check of the database found damage; see the log since the start";
+    } else if (sql::note_stall(status.oldest_s,
+                               "the disk does not respond, or another program has locked the database",
                                health)) {
       return;
     } else if (free < options_.refuse_free_bytes) {
       health.level = StorageLevel::disk_scarce;
-      health.reason = mebibytes(free) + " free on the disk: no new missions";
+      health.reason = mebibytes(free) + " free on the disk: no new mission can start";
     } else if (free < options_.warn_free_bytes) {
       health.level = StorageLevel::disk_low;
       health.reason = mebibytes(free) + " free on the disk";
@@ -158,7 +159,7 @@ Result<bool> judge_file(const DataFolder& folder) {
   std::ifstream in(folder.database(), std::ios::binary);
   std::string magic(16, '\0');
   if (!in.read(magic.data(), 16) || magic != std::string("SQLite format 3\0", 16)) {
-    return damaged(folder, "this is not a database any more");
+    return damaged(folder, "this is no longer a database");
   }
   // Only the very first start, before the WAL, has a journal; when it was killed, the journal must be undone
   // to read.
@@ -175,7 +176,8 @@ Result<bool> judge_file(const DataFolder& folder) {
   if (version > newest_schema_version()) {
     return make_error(Errc::unsupported,
                       "database " + folder.database().string() + " has version " + std::to_string(version) +
-                          "; this anchord knows up to " + std::to_string(newest_schema_version()) +
+                          "; this anchord supports versions up to " +
+                          std::to_string(newest_schema_version()) +
                           ". Use the newer anchord, or a copy from " + folder.backups().string());
   }
   return false;
@@ -196,7 +198,7 @@ Result<std::unique_ptr<SqliteConnection>> sql::open_sqlite_file(const StorageOpt
   if (!fresh) {
     BOOST_OUTCOME_TRY(fresh, judge_file(folder));
   }
-  if (fresh && folder.had_database()) return damaged(folder, "nothing is stored in it any more");
+  if (fresh && folder.had_database()) return damaged(folder, "it no longer contains any data");
   auto writer = std::make_unique<SqliteConnection>(folder.database(), fresh ? Mode::create : Mode::read_write,
                                                    options.synchronous, options.max_pages);
   if (writer->read_only_file()) {

@@ -105,7 +105,7 @@ class SqlWebhookStore final : public WebhookStore {
       if (query.returned()) return std::nullopt;
       Query known(c, std::string(k_columns) + "WHERE id = ?1");
       known << w.id;
-      if (known.step()) return make_error(Errc::conflict, "the webhook was changed in between");
+      if (known.step()) return make_error(Errc::conflict, "the webhook was changed in the meantime");
       return absent("webhook", w.id);
     });
   }

@@ -70,8 +70,8 @@ std::int64_t ns(std::chrono::milliseconds time) { return std::chrono::nanosecond
 
 Error taken_over(const JobId& job) {
   return make_error(Errc::conflict, "job " + to_string(job) +
-                                        " is no longer this worker's: it did not answer for longer than its "
-                                        "lease, or the job was removed");
+                                        " no longer belongs to this worker: it gave no sign of life for "
+                                        "longer than its lease, or the job was removed");
 }
 
 class SqlWorkStore final : public WorkStore {
@@ -293,8 +293,8 @@ Result<std::unique_ptr<WorkStore>> open_work(const std::string& address) {
     if (const int version = sql::postgres_version(connection); version != newest_schema_version())
       return make_error(Errc::unsupported,
                         "database " + shown + " has version " + std::to_string(version) +
-                            ", this anchord works with version " + std::to_string(newest_schema_version()) +
-                            ": run the same anchord on server and workers, the server first");
+                            ", this anchord needs version " + std::to_string(newest_schema_version()) +
+                            ": install the same version on server and workers, the server first");
   } catch (const sql::SqlError& error) {
     return sql::to_error(error);
   }

@@ -47,7 +47,7 @@ std::optional<Error> WriteQueue::write(std::size_t rows, const Work& work) {
   if (too_many_rows || shared->queue.size() >= limits_.max_calls) {
     return make_error(Errc::queue_full, "the write queue is full: " + std::to_string(shared->queued_rows) +
                                             " rows in " + std::to_string(shared->queue.size()) +
-                                            " calls wait");
+                                            " calls are waiting");
   }
   shared->queue.push_back(&task);
   shared->queued_rows += rows;
@@ -249,10 +249,11 @@ void WriteQueue::watch_place() {
   const auto now = SteadyClock::now();
   if (now >= next_save_) {
     const auto copy = save_beside(*connection_, file_);
-    saved_ = copy ? ". All that was stored is in " + copy.value().filename().string() +
-                        " beside it: stop anchord, put that copy in its place, start it again"
-                  : ". Do not stop anchord: no copy of what was stored could be made (" +
-                        copy.error().message + ")";
+    saved_ =
+        copy ? ". All that was stored is in " + copy.value().filename().string() +
+                   " beside it: stop anchord, rename that copy to the name of the database, start it again"
+             : ". Do not stop anchord: no copy of what was stored could be made (" + copy.error().message +
+                   ")";
     next_save_ = copy ? SteadyClock::time_point::max() : now + k_save_every;
   }
   note(misplaced());

@@ -77,7 +77,8 @@ Result<Bundle> read_bundle(std::string bytes) {
   const std::unique_ptr<std::FILE, CloseFile> file(std::tmpfile());
   if (!file || std::fwrite(bytes.data(), 1, bytes.size(), file.get()) != bytes.size() ||
       std::fflush(file.get()) != 0)
-    return make_error(Errc::storage_full, "no room in /tmp for a bundle of " + megabytes(bytes.size()));
+    return make_error(Errc::storage_full,
+                      "not enough space in /tmp for a bundle of " + megabytes(bytes.size()));
   BOOST_OUTCOME_TRY(const auto zip,
                     api::ZipReader::open("/proc/self/fd/" + std::to_string(fileno(file.get()))));
   BOOST_OUTCOME_TRY(const auto text, zip.text(api::k_bundle_manifest, k_manifest_bytes));
@@ -145,7 +146,7 @@ class Flights {
 
   void later(const Json& mission) {
     ++out_.flights_recording;
-    options_.report("flight \"" + text_of(mission, "name") + "\" is not finished: left for the next time");
+    options_.report("flight \"" + text_of(mission, "name") + "\" is not finished: it is sent by a later run");
   }
 
   bool has_missing_calibration(const std::string& mission) const {
@@ -180,7 +181,8 @@ class Flights {
                                                        .type = api::k_bundle_type,
                                                        .bundle = true}));
     if (answer.status == 404 || answer.status == 405)
-      return make_error(Errc::unsupported, centre_.url() + " takes no flight bundles (" + in_words(answer) +
+      return make_error(Errc::unsupported, centre_.url() + " does not accept flight bundles (" +
+                                               in_words(answer) +
                                                "): it is older than this program, update it");
     if (answer.status != 200 && answer.status != 201) return failed(name, answer);
     return arrived(id, name, bundle, Json::parse(answer.body, nullptr, false));
@@ -189,7 +191,8 @@ class Flights {
   Result<void> arrived(const std::string& id, const std::string& name, const Bundle& bundle,
                        const Json& answer) {
     if (text_of(answer, "mission") != id || text_of(answer, "digest") != "sha256:" + bundle.digest)
-      return centre_.stranger("POST /api/v1/bundles", "the answer is not about the bundle that was sent");
+      return centre_.stranger("POST /api/v1/bundles",
+                              "the answer does not belong to the bundle that was sent");
     std::set<std::string> left_out;
     for (const auto& left : member(answer, "left_out")) {
       const auto what = text_of(left, "what");
@@ -204,7 +207,7 @@ class Flights {
     for (const auto& n : member(answer, "added")) rows += n.is_number_unsigned() ? n.get<std::uint64_t>() : 0;
     sent_[id] = sent_[id] || rows > 0;
     options_.report(name + ": " +
-                    (rows > 0 ? std::to_string(rows) + " rows arrived" : std::string("was there")));
+                    (rows > 0 ? std::to_string(rows) + " rows stored" : std::string("already there")));
     if (const auto noted = taken_.note(id, bundle.own_digest); !noted)
       options_.report(noted.error().message + "; the next run sends this flight again");
     return boost::outcome_v2::success();

@@ -37,7 +37,7 @@ Result<void> send_models(Peer& field, Peer& centre, const SyncOptions& options, 
     }
     if (failure.empty()) {
       ++outcome.models_sent;
-      options.report(name + ": arrived, not active");
+      options.report(name + ": stored, not active");
     } else {
       refused(outcome, options, name + ": " + failure);
     }

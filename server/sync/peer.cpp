@@ -74,10 +74,13 @@ Result<server::ClientResponse> Peer::call(const PeerRequest& request) {
     if (answer) {
       const auto& a = answer.value();
       if (a.status == 401 || a.status == 403)
-        return make_error(Errc::invalid_argument, why + "; " + options_.token_option +
-                                                      " names a file with a token of that server (engineer)");
+        return make_error(Errc::invalid_argument,
+                          why + "; " + options_.token_option +
+                              " must give a file with a token of that server (role engineer)");
       if (a.status == 507)
-        return make_error(Errc::storage_full, why + "; the disk there is full: make room, then run it again");
+        return make_error(
+            Errc::storage_full,
+            why + "; the disk of that server is full: free some space, then run the command again");
       if (!again_later(a.status)) return answer;
       if (const auto header = a.headers.find("retry-after"); header != a.headers.end())
         wait = std::max(wait, gateway::retry_after(header->second, SystemClock{}.now()).value_or(wait));
@@ -94,8 +97,8 @@ Result<server::ClientResponse> Peer::call(const PeerRequest& request) {
 }
 
 Error Peer::stranger(const std::string& target, const std::string& what) const {
-  return make_error(Errc::invalid_argument,
-                    options_.url + " " + target + ": " + what + ": is this the address of an anchord?");
+  return make_error(Errc::invalid_argument, options_.url + " " + target + ": " + what +
+                                                ": is this the address of an anchord server?");
 }
 
 Result<Json> Peer::get(const std::string& target) {
@@ -103,7 +106,7 @@ Result<Json> Peer::get(const std::string& target) {
   if (answer.status >= 300)
     return make_error(errc_of(answer.status), options_.url + " GET " + target + ": " + in_words(answer));
   auto json = Json::parse(answer.body, nullptr, false);
-  if (!json.is_object()) return stranger(target, "the answer is no JSON object");
+  if (!json.is_object()) return stranger(target, "the answer is not a JSON object");
   return json;
 }
 
@@ -115,9 +118,9 @@ Result<std::vector<Json>> Peer::list(const std::string& target) {
     BOOST_OUTCOME_TRY(const auto page,
                       get(cursor.empty() ? first : first + "&cursor=" + api::percent_encoded(cursor)));
     const Json& items = page.contains("items") ? page["items"] : member(page, "features");
-    if (!items.is_array()) return stranger(target, "the answer is no list");
+    if (!items.is_array()) return stranger(target, "the answer is not a list");
     for (const auto& item : items) {
-      if (!item.is_object()) return stranger(target, "an item of the list is no JSON object");
+      if (!item.is_object()) return stranger(target, "an item of the list is not a JSON object");
       out.push_back(item);
     }
     cursor = text_of(page, "next_cursor");

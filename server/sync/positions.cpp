@@ -130,7 +130,7 @@ class Positions {
       } else if (keep == Keep::field) {
         for (const auto& [mine, there] : anchors)
           wanted_[mine.calibration].push_back(
-              {mine, there.revision, "kept over revision " + there.revision + " of the centre"});
+              {mine, there.revision, "kept instead of revision " + there.revision + " of the centre"});
       } else {
         Conflict conflict{site, name, {}};
         for (const auto& [mine, there] : anchors) {

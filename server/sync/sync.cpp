@@ -19,8 +19,8 @@ Result<void> check_centre(Peer& centre, const SyncOptions& options) {
   const auto may = [](const Json& role) { return role == "engineer" || role == "admin"; };
   if (!roles.is_array() || std::none_of(roles.begin(), roles.end(), may))
     return make_error(Errc::invalid_argument, centre.url() + ": the token of " + text_of(me, "name") +
-                                                  " has not the role engineer: make one there by 'anchord "
-                                                  "token create --role engineer'");
+                                                  " does not have the role engineer: create one there with "
+                                                  "'anchord token create NAME --role engineer'");
   options.report(centre.url() + ": anchord " + text_of(version, "version"));
   return boost::outcome_v2::success();
 }

@@ -115,7 +115,7 @@ Result<PemPair> make(const Wanted& wanted, X509* issuer, EVP_PKEY* issuer_key) {
   const PrivateKey key(EVP_EC_gen("P-256"));
   const Certificate made(X509_new());
   X509* const certificate = made.get();
-  if (!key || !made) return openssl_error("cannot make a key");
+  if (!key || !made) return openssl_error("cannot create a key");
   bool good = X509_set_version(certificate, X509_VERSION_3) == 1 && set_serial(certificate) &&
               set_time(X509_getm_notBefore(certificate), wanted.from_s) &&
               set_time(X509_getm_notAfter(certificate), wanted.to_s) &&
@@ -126,7 +126,7 @@ Result<PemPair> make(const Wanted& wanted, X509* issuer, EVP_PKEY* issuer_key) {
   for (const auto& [nid, value] : wanted.extensions)
     good = good && add_extension(certificate, issuer == nullptr ? certificate : issuer, nid, value);
   good = good && X509_sign(certificate, issuer == nullptr ? key.get() : issuer_key, EVP_sha256()) > 0;
-  if (!good) return openssl_error("cannot make the certificate of " + wanted.common_name);
+  if (!good) return openssl_error("cannot create the certificate of " + wanted.common_name);
   return to_pem(certificate, key.get());
 }
 
@@ -179,27 +179,28 @@ Result<PemPair> make_server_certificate(const PemPair& authority, const ServerNa
   if (wanted.days < 1 || wanted.days > k_most_days)
     return make_error(Errc::invalid_argument, std::to_string(wanted.days) + " days: must be 1 to " +
                                                   std::to_string(k_most_days) +
-                                                  ", tablets refuse longer ones");
+                                                  ", tablets do not accept longer ones");
   std::string names;
   for (const auto& name : wanted.names) {
     const bool address = is_address(name);
     if (!address && !is_dns_name(name))
-      return make_error(Errc::invalid_argument, "'" + to_utf8(name, 80) + "' is no host name or address");
+      return make_error(Errc::invalid_argument, "'" + to_utf8(name, 80) + "' is not a host name or address");
     names.append(names.empty() ? "" : ",").append(address ? "IP:" : "DNS:").append(name);
   }
   BOOST_OUTCOME_TRY(const auto issuer, certificate_from_pem(authority.certificate, "the authority"));
   BOOST_OUTCOME_TRY(const auto issuer_key, key_from_pem(authority.key, "the authority's key"));
   if (X509_check_private_key(issuer.get(), issuer_key.get()) != 1 || X509_check_ca(issuer.get()) != 1) {
     take_openssl_error();
-    return make_error(Errc::invalid_argument,
-                      "the authority cannot sign: its key is of another, or it is none");
+    return make_error(
+        Errc::invalid_argument,
+        "the authority cannot sign: its key belongs to another certificate, or it is not an authority");
   }
   const std::int64_t now_s = now.us() / 1'000'000;
   const std::int64_t end_s = time_of(X509_get0_notAfter(issuer.get())).us() / 1'000'000;
   if (end_s <= now_s)
     return make_error(Errc::invalid_argument,
-                      "the authority has expired: make a new one with 'anchord tls init "
-                      "--force', and let clients trust that");
+                      "the authority has expired: create a new one with 'anchord tls init --force', and make "
+                      "all clients trust it");
   BOOST_OUTCOME_TRY(auto made, make({wanted.names.front(),
                                      now_s - k_backdated_s,
                                      std::min(now_s + wanted.days * k_day_s, end_s),

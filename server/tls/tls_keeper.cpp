@@ -23,7 +23,7 @@ Result<std::string> read_text(const std::filesystem::path& file, const std::stri
   if (!in || !std::filesystem::is_regular_file(file, ignored)) {
     const std::string why = in ? "is no file" : std::strerror(errno);
     return make_error(Errc::not_found, setting + ": cannot read " + file.string() + ": " + why +
-                                           "; 'anchord tls init' makes one");
+                                           "; 'anchord tls init' creates one");
   }
   std::string text(k_most_bytes, '\0');
   in.read(text.data(), static_cast<std::streamsize>(text.size()));
@@ -35,7 +35,7 @@ Result<void> keep_from_others(const std::filesystem::path& key) {
   struct stat state {};
   if (::stat(key.c_str(), &state) == 0 && (state.st_mode & (S_IROTH | S_IWOTH)) != 0)
     return make_error(Errc::invalid_argument,
-                      "tls.key: everybody on this machine may read " + key.string() + ": chmod 600 it");
+                      "tls.key: every user of this machine may read " + key.string() + ": chmod 600 it");
   return boost::outcome_v2::success();
 }
 
@@ -84,7 +84,7 @@ Result<TlsKeeper::Served> TlsKeeper::read(const TlsFiles& files) {
     take_openssl_error();
     return make_error(Errc::invalid_argument, "tls.key: " + files.key.string() + " is not the key of " +
                                                   files.certificate.string() +
-                                                  ": give the key that this certificate was made for");
+                                                  ": give the key that belongs to this certificate");
   }
   return served;
 }
@@ -120,7 +120,8 @@ std::vector<TlsWarning> tls_warnings(const CertificateFacts& facts, const std::o
                                      UtcTime now) {
   std::vector<TlsWarning> out;
   const std::string how =
-      ": replace it ('anchord tls renew' if it was made here), then SIGHUP or systemctl reload anchord";
+      ": replace it ('anchord tls renew' if it was created with anchord), then send SIGHUP or run systemctl "
+      "reload anchord";
   if (facts.not_after <= now)
     out.push_back(
         {"tls.expired",
@@ -129,8 +130,8 @@ std::vector<TlsWarning> tls_warnings(const CertificateFacts& facts, const std::o
     out.push_back({"tls.expires", "The TLS certificate of " + first_name(facts) + " expires on " +
                                       day(facts.not_after) + how});
   if (failure)
-    out.push_back(
-        {"tls.not_reloaded", "The new TLS certificate was refused, the former is still served: " + *failure});
+    out.push_back({"tls.not_reloaded",
+                   "The new TLS certificate was rejected, the previous one is still served: " + *failure});
   return out;
 }
 

@@ -137,7 +137,7 @@ TEST_F(AnchorFiles, OfTwoMapSystemsAreRefused) {
   patch("0x6a3c", {{"site", json(other)["id"]}});
   const auto got = file("dxf");
   EXPECT_EQ(got.status, 422);
-  EXPECT_NE(got.body.find("EPSG:25831 and EPSG:25832: name one site"), std::string::npos) << got.body;
+  EXPECT_NE(got.body.find("EPSG:25831 and EPSG:25832: select one site"), std::string::npos) << got.body;
   EXPECT_EQ(file("dxf", {{"site", json(other)["id"]}}).status, 200);
 }
 

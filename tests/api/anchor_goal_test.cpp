@@ -72,7 +72,7 @@ TEST_F(OneLimit, IsTheTargetOfTheFlownPlanInCalibrationReportPublicationAndAncho
   EXPECT_EQ(told.at("0x6a3c")["reached"], true);
 
   const auto page = report(id);
-  for (const char* words : {k_of_plan, k_of_anchor, "Over the accuracy goal, which is overleaf: 0x6a2f."})
+  for (const char* words : {k_of_plan, k_of_anchor, "Outside the accuracy goal (see the next page): 0x6a2f."})
     EXPECT_THAT(page, HasSubstr(words));
   EXPECT_THAT(page, HasSubstr("<td><b>0x6a3c</b></td><td class=\"\">within</td>"));
   EXPECT_THAT(page, HasSubstr("<td><b>0x6a2f</b></td><td class=\"bad\">✕ over</td>"));

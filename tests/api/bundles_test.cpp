@@ -322,7 +322,7 @@ TEST_F(Bundles, ThatWereTamperedWithAreSeen) {
   };
   auto changed = good;
   content(changed, "tables/fix.ndjson").back() = ' ';
-  refused(changed, "tables/fix.ndjson has another digest");
+  refused(changed, "tables/fix.ndjson does not have the digest");
   auto longer = good;
   content(longer, "tables/fix.ndjson") += "\n";
   refused(longer, "tables/fix.ndjson has");

@@ -254,7 +254,7 @@ TEST_F(Calibrations, TellTheirAnswerInALocalFrameToo) {
   ASSERT_EQ(post("/api/v1/frames", R"({"name":"hall-a"})").status, 201);
   const auto unfitted = solve(mission, {{"frame", "hall-a"}});
   EXPECT_EQ(unfitted.status, 422);
-  EXPECT_NE(unfitted.body.find("never fitted"), std::string::npos) << unfitted.body;
+  EXPECT_NE(unfitted.body.find("has not been fitted"), std::string::npos) << unfitted.body;
   // x is north and y is west of a corner at (20, -30) m.
   const EnuFrame frame(m.origin);
   Json pairs = Json::array();
@@ -419,7 +419,7 @@ TEST_F(Calibrations, ShowTheMisclosureOfCheckPointsAndUseNone) {
   EXPECT_NEAR(told["points"][2]["delta_enu_m"][0].get<double>(), -3, 0.2);
   EXPECT_LT(told["points"][2]["p_value"], 1e-6);
   const auto page = get("/api/v1/calibrations/" + checked.value("id", "") + "/report").body;
-  EXPECT_NE(page.find("Check point 0x6002: solved less surveyed"), std::string::npos);
+  EXPECT_NE(page.find("Check point 0x6002: solved minus surveyed"), std::string::npos);
   EXPECT_NE(page.find("does not agree"), std::string::npos);
   // A base that is off moves all alike.
   const Json off{surveyed(0, moved), surveyed(1, moved), surveyed(3, moved)};

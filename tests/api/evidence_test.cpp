@@ -247,8 +247,8 @@ TEST_F(EvidenceRoutes, TheReportIsOnePageThatRunsNothing) {
   const std::string& html = page.body;
   EXPECT_EQ(header(page, "Content-Type"), "text/html; charset=utf-8");
   for (const char* part : {"<svg class=\"map\"", "Acceptance gates", "Ranges not used", "Error per iteration",
-                           "Calibration of the kit", "Checked by", "quad-03", "Ranges beyond the unknowns",
-                           "The two halves of the flight agree"})
+                           "Calibration of the kit", "Checked by", "quad-03",
+                           "Number of ranges minus unknowns", "The two halves of the flight agree"})
     EXPECT_NE(html.find(part), std::string::npos) << part;
   for (const char* part : {"<script", "http://", "https://", "url(", "@import", "<b>,", "flight 3 <b>"})
     EXPECT_EQ(html.find(part), std::string::npos) << part;

@@ -105,7 +105,7 @@ TEST_F(Flights, StartingAgainInTheAirNeedsAHomeOnTheGround) {
   std::string lease = control(R"({"action":"take","force":true})")["lease"];
   const auto elsewhere = act("start", lease, R"(,"plan":")" + plan + '"');
   EXPECT_EQ(elsewhere.status, 422);
-  EXPECT_NE(elsewhere.body.find("not known where it took off"), std::string::npos) << elsewhere.body;
+  EXPECT_NE(elsewhere.body.find("take-off point is not known"), std::string::npos) << elsewhere.body;
 
   mission_ = first;
   plan = make_plan();

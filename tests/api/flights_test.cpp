@@ -55,7 +55,7 @@ TEST_F(Flights, TheChecklistJudgesThePlaceOfTheTakeOffAsTheFlightWill) {
   };
   const auto good = make_plan();
   EXPECT_EQ(place(good)["state"], "failed");
-  EXPECT_NE(place(good).value("detail", "").find("not known where it stands"), std::string::npos);
+  EXPECT_NE(place(good).value("detail", "").find("its position is not known"), std::string::npos);
   fly(2);
   EXPECT_EQ(place(good)["state"], "ok") << place(good);
   // It stands 9 m west and 9 m south of the corner.

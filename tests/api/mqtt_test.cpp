@@ -165,7 +165,7 @@ TEST(MqttStatus, IsAnAlarmOnceTheBrokerIsAwayForTenSeconds) {
   BrokerStatus status{.connected = false, .address = "plant:8883", .tls = true, .reason = "no route"};
   EXPECT_EQ(api::broker_alarm(status), "");
   status.in_state_s = 10;
-  EXPECT_EQ(api::broker_alarm(status), "nothing is published to the MQTT broker plant:8883: no route");
+  EXPECT_EQ(api::broker_alarm(status), "nothing can be published to the MQTT broker plant:8883: no route");
   EXPECT_EQ(Json::parse(api::broker_json(status).dump())["state"], "disconnected");
   EXPECT_NE(api::broker_metrics(status).find("\nanchord_mqtt_connected 0\n"), std::string::npos);
   status.connected = true;

@@ -313,7 +313,8 @@ TEST_F(OmloxPush, GoesNowhereOnThisMachineUnlessAllowed) {
   const Json made = hub(stand_in.url());
   ASSERT_EQ(post(path(made) + "/test", "").status, 202);
   const Json told = delivery(made, [](const Json& one) { return !one["fault"].is_null(); });
-  EXPECT_NE(told["fault"].get<std::string>().find("allow it with webhooks.allow_private"), std::string::npos);
+  EXPECT_NE(told["fault"].get<std::string>().find("to allow it, set webhooks.allow_private"),
+            std::string::npos);
   EXPECT_TRUE(stand_in.seen().empty());
 }
 

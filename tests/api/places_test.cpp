@@ -162,7 +162,8 @@ TEST_F(BusyPlaces, ReadAPlanOfEachOfTwoTokensAtOnceAndRefuseMoreWithWhatToDo) {
     const auto again = put_as("one", mine);
     EXPECT_EQ(again.status, 429) << again.body;
     EXPECT_EQ(header(again, "Retry-After"), "1");
-    EXPECT_NE(again.body.find("another plan of this token is being read"), std::string::npos) << again.body;
+    EXPECT_NE(again.body.find("another plan of this token is being processed"), std::string::npos)
+        << again.body;
     meanwhile_ = [&] {
       const auto full = put_as("three", third);
       EXPECT_EQ(full.status, 503) << full.body;
@@ -210,7 +211,7 @@ TEST_F(Places, RefuseFilesThatAreNoPlansWithAReason) {
                          {good.substr(0, good.size() / 2), 422, "cut short"},
                          {floor_plan::png_head(400, 300), 422, "cannot be decoded"},
                          {"GIF89a", 415, "PNG, JPEG, (Geo)TIFF, PDF or ASCII DXF"},
-                         {"%PDF-1.7", 415, "draws no PDF"},
+                         {"%PDF-1.7", 415, "cannot read PDF"},
                          {"AutoCAD Binary DXF\r\n\x1a", 415, "save it as ASCII DXF"},
                          {floor_plan::dxf::entities("0\nTEXT\n1\nA\n"), 422, "no line in its model space"},
                          {"0\nSECTION\n2\nENTITIES\n0\nLINE\n1x\n", 422, "near its line"},
@@ -354,7 +355,7 @@ TEST_F(BusyPlaces, TakeNothingOnTrustThatAWorkerSaysOfTiles) {
     say_of_tiles_ = answer;
     ASSERT_EQ(put(f + "/plan/georeference", f, clicks().dump()).status, 200) << answer;
     EXPECT_TRUE(json(get(f))["tiles"].is_null()) << answer;
-    EXPECT_EQ(json(get(f))["tiles_missing"], "the worker's answer cannot be read") << answer;
+    EXPECT_EQ(json(get(f))["tiles_missing"], "the answer of the worker process cannot be read") << answer;
   }
 }
 

@@ -132,10 +132,10 @@ TEST_F(PlanInFlight, ItIsRefusedWhereItIsNotSafeAndTheOldPlanFliesOn) {
   edit([](Json& plan) { plan["no_fly"] = Json::array({box(-9, -8, -4, -3)}); });
   EXPECT_EQ(difference()["takeable"], false);
   EXPECT_TRUE(refused_with(take(lease, 2),
-                           "the aircraft would be where it is not allowed: over the building "
+                           "the aircraft would be at a position that is not allowed: over the building "
                            "or inside a no-fly area"));
   edit([](Json& plan) { plan["no_fly"] = Json::array({box(-9.5, -12.5, -8.5, -11)}); });
-  EXPECT_TRUE(refused_with(take(lease, 3), "the way home is cut")) << take(lease, 3).body;
+  EXPECT_TRUE(refused_with(take(lease, 3), "the way home would be blocked")) << take(lease, 3).body;
   edit([](Json& plan) {
     plan["no_fly"] = Json::array();
     plan["waypoints"][1] = waypoint(15, 10, 9);  // over the building
@@ -145,7 +145,7 @@ TEST_F(PlanInFlight, ItIsRefusedWhereItIsNotSafeAndTheOldPlanFliesOn) {
     plan["waypoints"][1] = waypoint(36.5, -5.6, 9);
     plan["settings"]["min_height_m"] = 8;
   });
-  EXPECT_TRUE(refused_with(take(lease, 5), "m high, the band begins at 8.0 m")) << take(lease, 5).body;
+  EXPECT_TRUE(refused_with(take(lease, 5), "m high, the height band begins at 8.0 m")) << take(lease, 5).body;
   edit([](Json& plan) {
     plan["settings"]["min_height_m"] = 1.5;
     plan["origin"]["h_m"] = 60;
@@ -153,7 +153,8 @@ TEST_F(PlanInFlight, ItIsRefusedWhereItIsNotSafeAndTheOldPlanFliesOn) {
   EXPECT_TRUE(refused_with(take(lease, 6), "heights are measured from it"));
   const auto log = database_->stores().access.audit(200);
   EXPECT_TRUE(std::ranges::any_of(log.value(), [](const auto& e) {
-    return e.what.starts_with("mission.plan ") && e.result.starts_with("refused: the way home is cut");
+    return e.what.starts_with("mission.plan ") &&
+           e.result.starts_with("refused: the way home would be blocked");
   }));
   ASSERT_EQ(act("skip", lease).status, 202);
   EXPECT_TRUE(fly_until([&] { return (at() - Vector3d(36.5, -5.6, 9)).norm() < 1.5; }, 90))

@@ -267,7 +267,7 @@ TEST_F(Plans, TellWhatIsWrongWithKml) {
   EXPECT_THAT(broken("<kml>\n<Placemark></kml>"), HasSubstr("line 2"));
   EXPECT_THAT(broken("<!DOCTYPE kml [<!ENTITY a 'b'>]><kml/>"), HasSubstr("document type"));
   EXPECT_THAT(broken("<gpx/>"), HasSubstr("not kml"));
-  EXPECT_THAT(broken("<kml><Document/></kml>"), HasSubstr("nothing is drawn"));
+  EXPECT_THAT(broken("<kml><Document/></kml>"), HasSubstr("it contains no drawing"));
   EXPECT_THAT(broken(std::string("PK\x03\x04", 4)), HasSubstr("unpack"));
 }
 

@@ -283,7 +283,7 @@ TEST_F(Webhooks, GoNowhereOnThisMachineUnlessAllowed) {
   const auto end = std::chrono::steady_clock::now() + 20s;
   Json told = delivery(made, "pending");
   while (told["fault"].is_null() && std::chrono::steady_clock::now() < end) told = delivery(made, "pending");
-  EXPECT_NE(told["fault"].dump().find("allow it with webhooks.allow_private"), std::string::npos) << told;
+  EXPECT_NE(told["fault"].dump().find("to allow it, set webhooks.allow_private"), std::string::npos) << told;
   EXPECT_EQ(receiver.letters(0).size(), 0U);
 }
 

@@ -72,7 +72,8 @@ async function listen(server) {
     if (message.sub === subs[0]) {
       heard.streamed += rows.length;
       for (const row of rows) heard.told.add(of_range(row));
-    } else heard.left += rows.filter((event) => JSON.stringify(event).includes('left the live path')).length;
+    } else
+      heard.left += rows.filter((event) => JSON.stringify(event).includes('dropped from the live estimates')).length;
   });
   for (const [i, topic] of ['ranges', 'events'].entries()) {
     client.send({ op: 'sub', id: i + 1, topic });
@@ -177,7 +178,7 @@ async function play(recorded, tags, rate) {
     const took = (performance.now() - start) / 1000,
       server_cpu = cpuSeconds(server.pid) - before;
     if (code !== 0) throw new Error(`replay ended with ${code}: ${said}`);
-    const [accepted, known, refused] = /(\d+) rows accepted, (\d+) known already, (\d+) refused/
+    const [accepted, known, refused] = /(\d+) rows accepted, (\d+) duplicates, (\d+) rejected/
       .exec(said)
       .slice(1)
       .map(Number);
@@ -224,8 +225,8 @@ async function recorded_bytes(row, name, tags, options, seconds) {
       name,
       `${r.perSecond.toFixed(0)} ranges/s, server ${percent(r.server)}, decoder ${percent(r.decoder)} (both at 1 ` +
         `000/s: ${percent(((r.server + r.decoder) * 1000) / r.perSecond)}); ${recorded.ranges} recorded, ${r.stored} ` +
-        `stored, ${r.untold} of them not on the stream, ${r.refused} refused, ${r.gaps} gaps, ${r.left} left the ` +
-        'live path',
+        `stored, ${r.untold} of them not on the stream, ${r.refused} refused, ${r.gaps} gaps, ${r.left} dropped from the ` +
+        'live estimates',
       `aim 1 000 ranges/s on 2 cores without a drop${whole ? '' : ': MISSED'}; ${megabytes.toFixed(0)} MB recorded ` +
         `at ${recorded.perSecond.toFixed(0)} ranges/s`,
     );

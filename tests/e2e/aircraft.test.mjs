@@ -63,7 +63,7 @@ test('planned from the outline, checked, started', async () => {
   const list = () => get(`/api/v1/missions/${mission}/checklist?plan=${plan}`);
   assert.equal((await send(`/api/v1/missions/${mission}/checklist`, { plan })).status, 200);
   await eventually(
-    'RTK is fixed for 10 s',
+    'RTK has been fixed for 10 s',
     async () => (await list()).items.find((i) => i.id === 'rtk').state === 'ok',
     60_000,
     500,

@@ -224,7 +224,7 @@ test('an aircraft whose texts hold 0x80 to 0xff is flown, and its text is UTF-8'
   }
   const started = await eventually('the flight begins', async () => {
     const answer = await post(`/api/v1/missions/${mission}/actions`, { action: 'start', plan, lease });
-    return answer.status === 202 || !/not known where/.test(answer.json.detail) ? answer : null;
+    return answer.status === 202 || !/position is not known/.test(answer.json.detail) ? answer : null;
   });
   assert.equal(started.status, 202, JSON.stringify(started.json));
   const { drone } = await eventually('its text', async () => {
@@ -365,9 +365,9 @@ test('what is kept of devices never keeps the server from starting: it says whic
   );
   for (const [i, why] of [
     [1, /no driver for "lidar"/],
-    [2, /format: one of/],
-    [3, /address: not a text/],
-    [5, /no object/],
+    [2, /format: must be one of/],
+    [3, /address: not a string/],
+    [5, /not an object/],
   ]) {
     assert.equal(devices[i].state, 'off');
     assert.match(devices[i].reason, /^not started: .*; correct its settings or remove it$/);

@@ -76,7 +76,7 @@ test('an import to where nobody listens ends soon, one without a token says how 
     const port = await dead_port();
     const nobody = await run(['import', 'flight', flight, '--url', `http://127.0.0.1:${port}`], { deadlineMs: 30_000 });
     assert.equal(nobody.code, 1, nobody.stderr);
-    assert.match(nobody.stderr, /no anchord answers at http:\/\/127\.0\.0\.1:\d+: .*--url/);
+    assert.match(nobody.stderr, /no anchord server answers at http:\/\/127\.0\.0\.1:\d+: .*--url/);
     server = await startServer({ auth: 'on' });
     const stranger = await run(['import', 'flight', flight, '--url', server.url]);
     assert.notEqual(stranger.code, 0);
@@ -90,7 +90,7 @@ test('an import to where nobody listens ends soon, one without a token says how 
 test('top prints a server once as plain text into a pipe, and fails where nobody listens or without a token', async () => {
   const nobody = await run(['top', '--once', '--url', `http://127.0.0.1:${await dead_port()}`], { deadlineMs: 30_000 });
   assert.deepEqual([nobody.code, nobody.stdout], [1, '']);
-  assert.match(nobody.stderr, /no anchord answers at http:\/\/127\.0\.0\.1:\d+: .*--url/);
+  assert.match(nobody.stderr, /no anchord server answers at http:\/\/127\.0\.0\.1:\d+: .*--url/);
   const server = await startServer({ auth: 'on' });
   try {
     for (const args of [['--once'], []]) {
@@ -100,7 +100,7 @@ test('top prints a server once as plain text into a pipe, and fails where nobody
       assert.equal(code, 0, stderr);
       assert.match(stdout, /^anchord \d+\.\d+\.\d+.* at http[^]*\nHealth: READY\n/);
       assert.match(stdout, /\nALARMS[^]*\nMISSION IN FLIGHT[^]*\nDEVICES[^]*\nQUEUES[^]*\nJOBS/);
-      assert.match(stdout, /rows to be stored or estimated +\d+\n[^]* commands +\d+\n/);
+      assert.match(stdout, /rows waiting for storage or estimation +\d+\n[^]* commands +\d+\n/);
       assert.ok(!stdout.includes('\u001b'), 'an escape code');
     }
     const stranger = await run(['top', '--once', '--url', server.url]);
@@ -154,7 +154,7 @@ test('doctor says what is wrong with folder and port, and of a running server ho
     const taken = await looked('--data-dir', folder, '--listen', `127.0.0.1:${server.port}`);
     assert.equal(taken.code, 1);
     assert.equal(taken.found.port.level, 'failed');
-    assert.match(taken.found.port.advice, /another program listens there/);
+    assert.match(taken.found.port.advice, /another program uses this port/);
     await server.kill();
     const stopped = await looked('--data-dir', server.dataDir);
     assert.equal(stopped.found.database.level, 'ok');

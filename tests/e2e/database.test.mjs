@@ -111,7 +111,7 @@ test('a copy that was killed goes on where it was; until then no server takes th
     assert.notEqual(served.code, 0);
     assert.match(served.stderr, /database copy/);
     const other = await database('copy', join(folder, 'back'), to);
-    assert.match(other.stderr, /was not finished/);
+    assert.match(other.stderr, /was interrupted/);
     const resumed = await database('copy', flown, to);
     assert.equal(resumed.code, 0, resumed.stderr);
     assert.equal((await database('check', flown, to)).code, 0);
@@ -121,7 +121,7 @@ test('a copy that was killed goes on where it was; until then no server takes th
 test('a copy into rows, from nothing, or of a folder in use is refused, and changes nothing', async () => {
   const again = await database('copy', flown, postgres.url('copied'));
   assert.equal(again.code, 1);
-  assert.match(again.stderr, /has rows already.*createdb/);
+  assert.match(again.stderr, /already has rows.*createdb/);
   const nothing = await database('copy', join(folder, 'nowhere'), await address('empty'));
   assert.equal(nothing.code, 2);
   assert.equal(existsSync(join(folder, 'nowhere')), false);

@@ -78,7 +78,7 @@ test('identify makes lights blink, of the tag or of an anchor, over REST and by 
   assert.deepEqual(JSON.parse(anchor.stdout), { lights: 'blinked', network_id: '0x6a21' });
   const rover = await cli('identify', 'rover');
   assert.equal(rover.code, 1);
-  assert.match(rover.stderr, /rover takes no "identify"/);
+  assert.match(rover.stderr, /GNSS receiver does not support the command "identify"/);
   await eventually('talking as before', async () => (await device('good')).state === 'talking');
 });
 

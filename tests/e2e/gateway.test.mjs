@@ -283,5 +283,5 @@ test('its metrics are well formed, and its pages are for this machine alone', ()
     await gateway.kill('SIGTERM');
     const { code, stderr } = await gateway.cli();
     assert.equal(code, 1);
-    assert.match(stderr, /no gateway runs in/);
+    assert.match(stderr, /no gateway is running on/);
   }));

@@ -161,7 +161,12 @@ test('the checklist is worked off and the flight started, by touch alone', async
   const { page, id } = tablet;
   await id('nav-live').tap();
   await id('open-checklist').tap();
-  await eventually('RTK is fixed for 10 s', async () => /ok|green/.test(await text(id('check-rtk'))), 60_000, 500);
+  await eventually(
+    'RTK has been fixed for 10 s',
+    async () => /ok|green/.test(await text(id('check-rtk'))),
+    60_000,
+    500,
+  );
   await eventually(
     'start is free',
     async () => {

@@ -158,7 +158,7 @@ test('tags of other makers measure by a mapping from a TOML file: over the broke
     'mapping={"tag":"id"}',
   ]);
   assert.equal(wrong.code, 1);
-  assert.match(wrong.stderr, /mapping\/tag: "id" is no JSON pointer/);
+  assert.match(wrong.stderr, /mapping\/tag: "id" is not a JSON pointer/);
 });
 
 test('a broker that is away is seen in /system, on /metrics and as an alarm, and gets everything when it is back', async () => {
@@ -202,7 +202,7 @@ test('a password does not go to another machine in the clear, and settings that 
     return stderr;
   };
   const login = ['--mqtt-user=anchord', `--mqtt-password-file=${password}`];
-  assert.match(await why('--mqtt-host=192.0.2.1', ...login), /mqtt\.password_file: .* in the clear; set mqtt\.ca_file/);
+  assert.match(await why('--mqtt-host=192.0.2.1', ...login), /mqtt\.password_file: .* unencrypted; set mqtt\.ca_file/);
   assert.match(await why('--mqtt-host=a', '--mqtt-prefix=a/#'), /mqtt\.prefix: /);
   assert.match(await why('--mqtt-host=a', '--mqtt-port=70000'), /mqtt\.port: 70000 is above 65535/);
   assert.match(await why('--mqtt-host=a', '--mqtt-ca-file=/nowhere.pem'), /mqtt\.ca_file: \/nowhere\.pem/);

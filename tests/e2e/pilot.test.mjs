@@ -126,7 +126,7 @@ test('start is blocked until the checklist is green; then the aircraft flies, ho
   await id('check-sound').waitFor({ state: 'detached' });
   assert.equal(await id('cmd-start').isEnabled(), false);
   await eventually(
-    'RTK is fixed for 10 s',
+    'RTK has been fixed for 10 s',
     async () => /ok|green/.test(await text(id('check-rtk').locator('.sr'))),
     60_000,
     500,

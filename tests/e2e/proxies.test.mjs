@@ -107,7 +107,7 @@ async function everything(url, curl, port) {
     '\n%{http_code}',
     url + plan,
   );
-  assert.match(sent.stdout, /no PNG, JPEG[^]*\n415$/, '40 MB came to the server, which looked at them');
+  assert.match(sent.stdout, /not a PNG, JPEG[^]*\n415$/, '40 MB came to the server, which looked at them');
 
   const socket = new WebSocket(`wss://anchord.example:${port}/api/v1/ws`, 'anchord.v1', {
     ca: readFileSync(at('ca.pem')),

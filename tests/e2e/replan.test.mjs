@@ -93,7 +93,7 @@ test('a no-fly area over the aircraft is refused with its reason, and the plan b
   await save((p) => p.no_fly.push(square(drone, 15)));
   await id('plan-review').click();
   await eventually('the reason', async () =>
-    /would be where it is not allowed|way home is cut/.test(await text(id('plan-refused'))),
+    /would be at a position that is not allowed|way home would be blocked/.test(await text(id('plan-refused'))),
   );
   assert.ok(await id('plan-take').isDisabled());
   assert.ok(await id('cmd-hold').isVisible(), 'Hold stays in reach');

@@ -38,7 +38,7 @@ export async function startFlight(server, mission) {
   const list = () => get(`/api/v1/missions/${mission}/checklist?plan=${plan}`);
   await send(`/api/v1/missions/${mission}/checklist`, { plan });
   await eventually(
-    'RTK is fixed for 10 s',
+    'RTK has been fixed for 10 s',
     async () => (await list()).items.find((i) => i.id === 'rtk').state === 'ok',
     60_000,
     500,

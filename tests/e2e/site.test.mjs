@@ -73,7 +73,7 @@ test('a second run finds all of it and adds nothing', async () => {
   const { code, stderr } = await fill();
   assert.equal(code, 0, stderr);
   assert.deepEqual(await standing(), first);
-  assert.match(stderr, /there already/);
+  assert.match(stderr, /already exists/);
 });
 
 test('ranges of a live flight are told apart by the promoted model', async () => {
@@ -141,5 +141,5 @@ test('nothing is promoted or published over what others decided', async () => {
 test('a server that is not there is named, with what to do', async () => {
   const { code, stderr } = await run(['simulate', 'site', '--url', 'http://127.0.0.1:1']);
   assert.equal(code, 1);
-  assert.match(stderr, /no anchord answers at http:\/\/127\.0\.0\.1:1/);
+  assert.match(stderr, /no anchord server answers at http:\/\/127\.0\.0\.1:1/);
 });

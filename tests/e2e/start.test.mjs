@@ -164,7 +164,7 @@ test('a flight whose columns have other names is imported by saying what they ar
   const wrong = join(folder, 'notes.csv');
   writeFileSync(wrong, '1,2\n3,4\n');
   await page.getByLabel('Flight files').setInputFiles(wrong);
-  await id('import-problem').getByText('a header line of names is needed').waitFor();
+  await id('import-problem').getByText('a header line with names is needed').waitFor();
   assert.deepEqual(seen.errors, []);
   await page.close();
 });

@@ -129,7 +129,7 @@ test('a centre that is none, or an older one, or full, is refused in words and n
       'a login page',
       (_, res) => res.end('<html>please log in</html>'),
       2,
-      /no JSON object: is this the address of an anchord/,
+      /not a JSON object: is this the address of an anchord server/,
     ],
     ['not an object', (_, res) => json(res, 200, [1]), 2, /is this the address/],
     ['an object of others', (_, res) => json(res, 200, { version: 3 }), 2, /no version: is this the address/],
@@ -139,22 +139,27 @@ test('a centre that is none, or an older one, or full, is refused in words and n
       'a viewer',
       (req, res) => json(res, 200, req.url === '/version' ? { version: '1' } : { name: 'v', roles: ['viewer'] }),
       2,
-      /the token of v has not the role engineer/,
+      /the token of v does not have the role engineer/,
     ],
     [
       '404 for bundles',
       impostor((_, res) => json(res, 404, { detail: 'no such path' })),
       1,
-      /takes no flight bundles .*update it/,
+      /does not accept flight bundles .*update it/,
     ],
     [
       '507 for bundles',
       impostor((_, res) => json(res, 507, { detail: 'no space' })),
       1,
-      /507 no space; the disk there is full/,
+      /507 no space; the disk of that server is full/,
     ],
-    ['200 with nothing', impostor((_, res) => json(res, 200, {})), 2, /not about the bundle that was sent/],
-    ['200 with rubbish', impostor((_, res) => res.end('\u0000\u00ff{')), 2, /not about the bundle that was sent/],
+    ['200 with nothing', impostor((_, res) => json(res, 200, {})), 2, /does not belong to the bundle that was sent/],
+    [
+      '200 with rubbish',
+      impostor((_, res) => res.end('\u0000\u00ff{')),
+      2,
+      /does not belong to the bundle that was sent/,
+    ],
     ['half an answer to a bundle', impostor((_, res) => half(res)), 1, /closed the connection/],
   ]) {
     const got = await stranger(answer, (url) => run(words(url, '--wait', '1'), { deadlineMs: 60_000 }));
@@ -166,8 +171,8 @@ test('a centre that is none, or an older one, or full, is refused in words and n
 
 test('lists of a centre that have no end or hold no objects end the sync', async () => {
   for (const [models, said] of [
-    [{ items: [7] }, /no JSON object: is this/],
-    [{ items: 'x' }, /no list: is this/],
+    [{ items: [7] }, /not a JSON object: is this/],
+    [{ items: 'x' }, /not a list: is this/],
     [{ items: [], next_cursor: 'again' }, /the list has no end/],
   ]) {
     const answer = impostor((req, res) => {
@@ -187,12 +192,12 @@ test('over a link that is cut it stops, and goes on where it was; everything is 
   await proxy.cut();
   const stopped = await cut;
   assert.equal(stopped.code, 1, stopped.stderr);
-  assert.match(stopped.stderr, /run it again to go on/);
+  assert.match(stopped.stderr, /run the command again to continue/);
   await proxy.restore();
   proxy.bytesPerS = 0;
   const { code, stdout, stderr } = await sync();
   assert.equal(code, 0, stdout + stderr);
-  assert.match(stdout, /flights: 1 sent, 0 there already/);
+  assert.match(stdout, /flights: 1 sent, 0 already there/);
   assert.deepEqual(await counted(centre), await counted(field));
   assert.deepEqual(await published(centre), await published(field));
 });
@@ -202,7 +207,7 @@ test('again it finds everything there, also without its notes', async () => {
     if (!notes) rmSync(join(field.dataDir, 'sync.json'));
     const { code, stdout } = await sync();
     assert.equal(code, 0);
-    assert.match(stdout, /flights: 0 sent, 1 there already/);
+    assert.match(stdout, /flights: 0 sent, 1 already there/);
     assert.match(stdout, /anchors: 0 published/);
     assert.deepEqual(await counted(centre), await counted(field));
   }
@@ -217,14 +222,14 @@ test('a model that no flight brought, and a calibration of two flights, come onc
   await ok(field, '/api/v1/calibrations', { json: { missions }, headers: { prefer: 'wait=120' } });
   const { code, stdout, stderr } = await sync();
   assert.equal(code, 0, stdout + stderr);
-  assert.match(stdout, /flights: 1 sent, 1 there already.*\nmodels: 1 sent, 0 there already\n/);
+  assert.match(stdout, /flights: 1 sent, 1 already there.*\nmodels: 1 sent, 0 already there\n/);
   assert.deepEqual(await counted(centre), await counted(field));
   flights.push(await fly(field, 6)); // its kit learned something, which is in the bundles of all its flights
   const next = await sync();
   assert.equal(next.code, 0, next.stdout + next.stderr);
-  assert.match(next.stdout, /flights: 1 sent, 2 there already.*\nmodels: 0 sent, 1 there already\n/);
+  assert.match(next.stdout, /flights: 1 sent, 2 already there.*\nmodels: 0 sent, 1 already there\n/);
   await ok(field, '/api/v1/calibrations', { json: { missions }, headers: { prefer: 'wait=120' } });
-  assert.match((await sync()).stdout, /flights: 1 sent, 2 there already/, 'one bundle brings a later calibration');
+  assert.match((await sync()).stdout, /flights: 1 sent, 2 already there/, 'one bundle brings a later calibration');
   proxy.toServer = 0;
   assert.equal((await sync()).code, 0);
   assert.ok(proxy.toServer < 20_000, `${proxy.toServer} bytes to find that all is there`);
@@ -256,7 +261,7 @@ test('what moved on in the field moves on at the centre without a question, whil
   running = false;
   await feeding;
   assert.equal(code, 0, stdout + stderr);
-  assert.match(stdout, /flights: 1 sent, 3 there already, 1 not finished/);
+  assert.match(stdout, /flights: 1 sent, 3 already there, 1 not finished/);
   assert.deepEqual(await published(centre), await published(field));
   assert.ok(sent >= 50);
   await ok(field, `/api/v1/missions/${live}/actions`, { json: { action: 'finish' } });
@@ -351,7 +356,7 @@ test('where both published it shows both positions and asks; centre leaves them,
     here[id].at.coordinates[2] - before[id].at.coordinates[2],
   );
   assert.ok(Math.abs(difference_m - Number(apart)) < 0.01, `${difference_m} ${apart}`);
-  assert.match(asked.stdout, /decide by --keep/);
+  assert.match(asked.stdout, /decide with --keep/);
   assert.deepEqual(await published(centre), before, 'nothing is decided by itself');
   const at_centre = await counted(centre);
   assert.ok(
@@ -385,7 +390,7 @@ test('where both published it shows both positions and asks; centre leaves them,
   assert.match(again.stdout, /anchors: 0 published/);
   assert.equal((await counted(centre)).revisions.length, revisions);
   const [newest] = (await ok(centre, '/api/v1/revisions?limit=1')).items;
-  assert.match(newest.note, /anchord sync from http.*: kept over revision \d+ of the centre/);
+  assert.match(newest.note, /anchord sync from http.*: kept instead of revision \d+ of the centre/);
 });
 
 test('what cannot go is refused with what to do', async () => {
@@ -397,10 +402,10 @@ test('what cannot go is refused with what to do', async () => {
   assert.match(keep.stderr, /--keep mine: must be field, centre, or SITE=field/);
   const empty = await run(['sync', '--to', proxy.url, '--token-file', join(folder, 'token'), '--data-dir', folder]);
   assert.equal(empty.code, 1);
-  assert.match(empty.stderr, /no server runs in/);
+  assert.match(empty.stderr, /no server is running on/);
   await proxy.cut();
   const away = await sync('--wait', '1');
   await proxy.restore();
   assert.equal(away.code, 1);
-  assert.match(away.stderr, /cannot reach .*trying again for 1 s\n[^]*run it again to go on/);
+  assert.match(away.stderr, /cannot reach .*trying again for 1 s\n[^]*run the command again to continue/);
 });

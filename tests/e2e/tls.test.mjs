@@ -52,7 +52,7 @@ test('keys are for their owner alone, and nothing is replaced unasked', async ()
   const before = readFileSync(at('ca.pem'), 'utf8');
   const again = await tls('init', '--dir', folder);
   assert.equal(again.code, 2);
-  assert.match(again.stderr, /is there already: 'anchord tls renew'.*--force/);
+  assert.match(again.stderr, /already exists: 'anchord tls renew'.*--force/);
   assert.equal(readFileSync(at('ca.pem'), 'utf8'), before);
   const other = mkdtempSync(join(tmpdir(), 'anchord e2e tls '));
   assert.equal((await tls('init', '--dir', other)).code, 0);
@@ -69,7 +69,7 @@ test('curl takes it with the authority and not without', async () => {
   const named = ['--cacert', at('ca.pem'), '--connect-to', `::127.0.0.1:${server.securePort}`];
   assert.equal((await curl(...named, 'https://evil.example/readyz')).code, 60);
   const plain = await curl(`http://127.0.0.1:${server.securePort}/readyz`);
-  assert.match(plain.stdout, /speaks HTTPS/);
+  assert.match(plain.stdout, /uses HTTPS/);
 });
 
 test('TLS 1.2 and 1.3 verify, older versions and weak ciphers get nowhere', async () => {
@@ -129,7 +129,7 @@ test('a certificate is exchanged while a stream runs, and a bad one is not', asy
   writeFileSync(at('server.pem'), 'rubbish');
   reload();
   await eventually('the alarm about it', async () => (await alarms()).includes('tls.not_reloaded'));
-  assert.match(server.log, /certificate was refused, the former is still served.*server\.pem/);
+  assert.match(server.log, /certificate was rejected, the previous one is still served.*server\.pem/);
   assert.equal(await serial(), second);
   await beat();
 

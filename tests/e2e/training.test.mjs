@@ -175,7 +175,7 @@ test('a worker that dies fails its job with the reason, and nothing else', async
   process.kill(worker, 'SIGKILL');
   const job = await ended(id);
   assert.equal(job.state, 'failed');
-  assert.match(job.problem.detail, /worker was ended by signal 9/);
+  assert.match(job.problem.detail, /worker process was ended by signal 9/);
   assert.match(job.problem.detail, /start the run again/);
   assert.equal((await server.fetch('/healthz')).status, 200);
 });

@@ -157,7 +157,7 @@ test('a worker makes the bytes that the server makes, and the server signs them'
   const alarm = await eventually('an alarm', async () =>
     (await call('GET', '/api/v1/alarms', { expect: 200 })).json.items.find(({ id }) => id === 'jobs.no_worker'),
   );
-  assert.match(alarm.text, /no worker was seen for a minute/);
+  assert.match(alarm.text, /no worker has been seen for one minute/);
   const worker = await started('first');
   const job = await succeeds(there);
   assert.deepEqual([job.worker, job.attempts], ['first', 1]);
@@ -169,7 +169,7 @@ test('a worker makes the bytes that the server makes, and the server signs them'
   const looked = await run(['doctor', '--json', '--database', postgres.url('anchord'), '--data-dir', server.dataDir], {
     env: postgres.env,
   });
-  assert.match(JSON.parse(looked.stdout).find(({ what }) => what === 'worker').seen, /^first, .*waits for jobs/);
+  assert.match(JSON.parse(looked.stdout).find(({ what }) => what === 'worker').seen, /^first, .*waiting for jobs/);
   assert.deepEqual(await worker.end(), { code: 0, signal: null });
   assert.equal(await postgres.psql('SELECT count(*) FROM worker', 'anchord'), '0');
 });

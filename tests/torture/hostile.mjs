@@ -262,7 +262,7 @@ test('everything hostile begins, and the flight starts all the same', async () =
   const checklist = async () =>
     (await call('pilot', 'GET', `/api/v1/missions/${mission}/checklist?plan=${stored}`)).json;
   await eventually(
-    'RTK is fixed for 10 s',
+    'RTK has been fixed for 10 s',
     async () => (await checklist())?.items.find((i) => i.id === 'rtk').state === 'ok',
     60_000,
     500,

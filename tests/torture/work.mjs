@@ -312,7 +312,7 @@ export class Promoter {
     this.sent = model;
     const answer = await ask(server, `/api/v1/models/${model}/promote`, { json: { reason: 'torture' } });
     if (later(answer)) return false;
-    // 422: it is the active one already, by the promotion whose answer was lost.
+    // 422: it is already the active one, by the promotion whose answer was lost.
     const json = must(answer, again ? [200, 409, 422] : 200, 'promote');
     this.acknowledged.push({ model, number: answer.status === 200 ? json.number : null });
     this.sent = null;

@@ -219,7 +219,7 @@ describe('the settings of a tag of another maker', () => {
     expect(missing({ ...BROKER, payload: 'pozyx', topic: '', mapping: '' })).toBe('');
   });
   it('is refused with a password and no user, and without the id that binary needs', () => {
-    expect(missing({ ...BROKER, password: 'secret' })).toMatch(/^User: missing, and a password needs one/);
+    expect(missing({ ...BROKER, password: 'secret' })).toMatch(/^User: missing, and a password needs a user/);
     expect(missing({ ...MODULE, mode: 'tlv' })).toMatch(/^Id of the tag: missing, and binary needs it/);
     for (const tag of ['6e01', '0x', '0x100000000', '-1'])
       expect(missing({ ...MODULE, tag })).toBe(`Id of the tag: ${tag} is no id. Type 32 bits at most, like 0x6e01.`);
@@ -240,21 +240,21 @@ describe('what the server rejects', () => {
   const refused = (pointer: string, detail: string): ApiError =>
     new ApiError(problem_of({ title: 'Validation', detail, errors: [{ pointer, detail }] }, 422));
   it('is of the field that it names, every fault of a mapping by itself', () => {
-    const text = 'mapping/tag: is needed, like "/tag"; mapping/x: there is no such key; there are topic, array';
+    const text = 'mapping/tag: is needed, like "/tag"; mapping/x: there is no such key; the keys are topic, array';
     expect(rejected_of(refused('/options', text), 'ndjson')).toEqual({
       field: 'mapping',
-      faults: ['mapping/tag: is needed, like "/tag"', 'mapping/x: there is no such key; there are topic, array'],
+      faults: ['mapping/tag: is needed, like "/tag"', 'mapping/x: there is no such key; the keys are topic, array'],
     });
-    expect(rejected_of(refused('/options', 'tag: an id like 0x022e'), 'dwm1001')?.field).toBe('tag');
-    expect(rejected_of(refused('/options/password', 'must be a text'), 'mqtt')).toEqual({
+    expect(rejected_of(refused('/options', 'tag: must be an id like 0x022e'), 'dwm1001')?.field).toBe('tag');
+    expect(rejected_of(refused('/options/password', 'must be a string'), 'mqtt')).toEqual({
       field: 'password',
-      faults: ['password: must be a text'],
+      faults: ['password: must be a string'],
     });
   });
   it('is of the whole form where it names no field of it', () => {
     expect(rejected_of(refused('/address', 'tag: the host is missing'), 'mqtt')).toBeNull();
     expect(rejected_of(refused('/options', 'must be an object below 10 kB'), 'mqtt')).toBeNull();
-    expect(rejected_of(refused('/options', 'mount: the name of a mount point'), 'ntrip')).toBeNull();
+    expect(rejected_of(refused('/options', 'mount: must be the name of a mount point'), 'ntrip')).toBeNull();
     expect(rejected_of(new Error('no answer'), 'mqtt')).toBeNull();
   });
 });

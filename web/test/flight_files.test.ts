@@ -118,8 +118,8 @@ describe('a flight from files', () => {
     );
     expect([f.fixes.length, f.ranges.length]).toEqual([1, 1]);
     expect(f.refused).toEqual([
-      'track.csv row 3: "x" is no time that is known (2026-05-04 10:00:01.5)',
-      'track.csv row 4: no place',
+      'track.csv row 3: "x" is not a time that can be read (like 2026-05-04 10:00:01.5)',
+      'track.csv row 4: no position',
       'ranges.csv row 3: no anchor',
       'ranges.csv row 4: no range',
     ]);
@@ -156,7 +156,7 @@ describe('a flight from files', () => {
   it.each([
     ['empty', '', /header line/],
     ['only a header', 'a,b\n', /header line/],
-    ['numbers alone', '1,2\n3,4\n', /first line is numbers/],
+    ['numbers alone', '1,2\n3,4\n', /first line has numbers/],
     ['a cell too many', 'a,b\n1,2,3\n', /row 2: 3 cells, the header has 2/],
     ['two columns of one name', 'a,a\n1,2\n', /two columns have the name "a"/],
     ['a quote without its end', 'a,b\n"1,2\n', /a quote is opened and not closed/],

@@ -60,14 +60,14 @@ describe('the gates of a running estimate', () => {
     expect(why_not_done(running)!.text).toContain('0.31 m (limit ≤ 0.20 m)');
   });
   it('say what holds an accurate answer back, and what to do', () => {
-    const why = 'the two halves of the flight put it 1.80 m apart';
+    const why = 'the two halves of the flight place it 1.80 m apart';
     const held = {
       ...running,
       gates: [gate('goal_h95_m', 0.31, 0.2, false), { ...gate('halves', 40, 16, false), why }],
     };
     expect(why_not_done(held)).toEqual({
       title: 'Why not done: an acceptance gate holds it back',
-      text: 'The two halves of the flight disagree: χ² 40.0 (limit ≤ χ² 16.0). The two halves of the flight put it 1.80 m apart.',
+      text: 'The two halves of the flight disagree: χ² 40.0 (limit ≤ χ² 16.0). The two halves of the flight place it 1.80 m apart.',
     });
   });
   it('of a calibration decide whether it is green', () => {

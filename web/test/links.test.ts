@@ -33,12 +33,14 @@ describe('the next point', () => {
     expect(grid_measure(g({ rule: 'a_optimal' }))).toBe('Expected error, rms');
   });
   it('is chosen only where the aircraft goes there', () => {
-    expect(grid_outcome({ chosen: 3, outcome: 'done_here: the best point would bring 1 %' })).toMatchObject({
+    expect(
+      grid_outcome({ chosen: 3, outcome: 'done_here: the best point would improve the result by only 1 %' }),
+    ).toMatchObject({
       word: 'ENOUGH HERE',
-      why: 'the best point would bring 1 %',
+      why: 'the best point would improve the result by only 1 %',
       flown: false,
     });
-    expect(grid_outcome({ chosen: null, outcome: 'no_point: nowhere to go' }).word).toBe('NO POINT');
+    expect(grid_outcome({ chosen: null, outcome: 'no_point: no point left to fly to' }).word).toBe('NO POINT');
     expect(grid_outcome({ chosen: 3, outcome: 'point: 33 % better' })).toMatchObject({ word: 'CHOSEN', tone: 'ok' });
   });
 });

@@ -123,12 +123,12 @@ describe('what a device stands for', () => {
     ['PORT TWICE', '/dev/pts/1: the same port as device "tag" (01a1ff6b-4649-78c7-a9aa-0611fa043203)', {}],
     ['LOST', 'tcp://127.0.0.1:9: refused: is the service of the device switched on?', {}],
     ['LOST', 'tcp://10.0.0.9:9001: no answer: is it on this network?', {}],
-    ['SILENT', 'silent for too long: opened again', {}],
-    ['LOST', 'tcp://10.0.0.9:9001: the other side closed', {}],
-    ['REFUSED', 'the caster refuses user or password', { kind: 'ntrip' }],
+    ['SILENT', 'nothing received for too long: opened again', {}],
+    ['LOST', 'tcp://10.0.0.9:9001: the other side closed the connection', {}],
+    ['REFUSED', 'the caster rejects the user or the password', { kind: 'ntrip' }],
     ['NO SUCH MOUNT', 'the caster has no mount "X"; it has A, B', { kind: 'ntrip' }],
-    ['NO POZYX', 'no Pozyx answers on this port', { network_id: null }],
-    ['SILENT', 'no Pozyx answers on this port', {}],
+    ['NO POZYX', 'no Pozyx tag answers on this port', { network_id: null }],
+    ['SILENT', 'no Pozyx tag answers on this port', {}],
   ])('is %s for "%s"', (word, reason, part) => {
     const s = standing(device({ state: 'lost', reason, ...part }), recent(0));
     expect([s.word, s.tone]).toEqual([word, 'bad']);

@@ -54,9 +54,9 @@ TEST(CsvRecord, TrimsRoundCellsAndNotWithinTheirQuotes) {
 }
 
 TEST(CsvRecord, RefusesAQuoteThatIsNotClosedAndTextBehindOneThatIs) {
-  EXPECT_EQ(records("a,\"b\nc,d\n"), (std::vector<Cells>{{"a quote that is not closed: \"b\nc,d\n"}}));
-  EXPECT_EQ(records("\"a\"b,c\n"), (std::vector<Cells>{{"text behind a closing quote: b,c\n"}}));
-  EXPECT_EQ(records("\""), (std::vector<Cells>{{"a quote that is not closed: \""}}));
+  EXPECT_EQ(records("a,\"b\nc,d\n"), (std::vector<Cells>{{"a quote is not closed: \"b\nc,d\n"}}));
+  EXPECT_EQ(records("\"a\"b,c\n"), (std::vector<Cells>{{"text after a closing quote: b,c\n"}}));
+  EXPECT_EQ(records("\""), (std::vector<Cells>{{"a quote is not closed: \""}}));
   const auto long_one = records("\"" + std::string(100'000, 'x'));
   EXPECT_LT(long_one.at(0).at(0).size(), 100u);
 }
@@ -107,7 +107,7 @@ class CsvFile : public testing::Test {
 TEST_F(CsvFile, NamesFileAndLineOfWhatIsWrong) {
   const std::string file = (folder_ / "t.csv").string();
   EXPECT_EQ(first_error("a,b\n1,2\n3\n"), file + ":3: 1 fields, the header has 2");
-  EXPECT_EQ(first_error("a,b\n\n1,\"2\n"), file + ":3: a quote that is not closed: \"2");
+  EXPECT_EQ(first_error("a,b\n\n1,\"2\n"), file + ":3: a quote is not closed: \"2");
   EXPECT_EQ(first_error("a,a\n"), file + ":1: column 'a' occurs twice");
   EXPECT_EQ(first_error(""), file + ": empty, expected a header line");
   EXPECT_EQ(first_error("\xEF\xBB\xBF"

@@ -108,7 +108,7 @@ TEST_F(FlightFolder, SaysWhatIsWrongWithASystem) {
   write("flight.json", R"({"track": {"frame": "crs", "point": "body"}})");
   expect_error("key 'crs' is missing");
   write("flight.json", R"({"track": {"frame": "local", "crs": "EPSG:25832", "point": "body"}})");
-  expect_error("are of the frame crs");
+  expect_error("are only for the frame crs");
   write("flight.json", R"({"track": {"frame": "crs", "crs": "EPSG:2056", "point": "body"}})");
   expect_error("flight.json: track: ");
   write("flight.json",

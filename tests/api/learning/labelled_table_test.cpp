@@ -156,7 +156,8 @@ TEST_F(LabelledTableTest, ReadsDecimalCommasBetweenSemicolonsAndRefusesThemBetwe
   const auto torn = read({plain("c.csv", "nlos,range_m\n0,5,25\n")});
   ASSERT_FALSE(torn);
   EXPECT_NE(torn.error().message.find("c.csv:2"), std::string::npos);
-  EXPECT_NE(torn.error().message.find("decimal commas need semicolons"), std::string::npos);
+  EXPECT_NE(torn.error().message.find("with decimal commas, separate the cells by semicolons"),
+            std::string::npos);
 }
 
 // The path to a file is none of the data's business: the same file elsewhere is the same data set.

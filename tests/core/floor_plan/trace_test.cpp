@@ -272,7 +272,7 @@ TEST(PlanTrace, SaysWhyNothingCanBeTraced) {
       for (int c = 0; c < 3; ++c) lines.pixels[static_cast<std::size_t>(3 * (y * 800 + x) + c)] = 0;
   const auto open = trace_plan(lines, scaled(0.02));
   ASSERT_FALSE(open.has_value());
-  EXPECT_NE(open.error().message.find("enclose nothing"), std::string::npos) << open.error().message;
+  EXPECT_NE(open.error().message.find("enclose no area"), std::string::npos) << open.error().message;
 }
 
 TEST(PlanTrace, EndsWhenItIsToldTo) {

@@ -96,7 +96,7 @@ TEST(SourceCrs, MakesHeightsAboveTheEllipsoid) {
   // gdaltransform -s_srs EPSG:4326+5773 -t_srs EPSG:4979
   const auto egm96 = opened(spec, at);
   EXPECT_NEAR(egm96.wgs84(at).value().height_m, 565.53273893789, 1e-3);
-  EXPECT_EQ(egm96.heights(), "above the ellipsoid, made of EGM96 height (error 1 m)");
+  EXPECT_EQ(egm96.heights(), "above the ellipsoid, computed from EGM96 height (error 1 m)");
   ASSERT_TRUE(read_heights("45.6", spec));
   EXPECT_NEAR(opened(spec, at).wgs84(at).value().height_m, 565.6, 1e-9);
   ASSERT_TRUE(read_heights("ellipsoidal", spec));
@@ -122,7 +122,7 @@ TEST(SourceCrs, RefusesWhatIsNoSystemOfPositions) {
     EXPECT_NE(why_not({crs}, at), "") << crs;
   SourceCrsSpec upright{"EPSG:25832"};
   upright.height_epsg = 25832;
-  EXPECT_NE(why_not(upright, at).find("no system of heights"), std::string::npos);
+  EXPECT_NE(why_not(upright, at).find("not a vertical system"), std::string::npos);
 }
 
 }  // namespace

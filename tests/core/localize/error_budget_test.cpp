@@ -155,7 +155,7 @@ TEST(ErrorBudget, NamesABiasNobodyKnows) {
   // All on one side: a bias moves them away and nothing else does.
   m.anchors = {{60, 2, 3}, {62, 10, 6}, {58, -8, 2}, {61, -3, 9}};
   FlightOptions options;
-  options.bias_gate_z = 0;  // no kit is taken as calibrated
+  options.bias_gate_z = 0;  // no kit is treated as calibrated
   EXPECT_EQ(largest(solved(m, options)), ErrorSource::bias);
 }
 

@@ -121,7 +121,7 @@ TEST(Unplaced, IsSaidFirstWithNumbersAndWhatToDo) {
   EXPECT_NE(first_note(millimetres).find("range_m is in metres"), std::string::npos);
   auto late = flight;
   for (auto& range : late.ranges) range.time.ns += 3'600'000'000'000;
-  EXPECT_NE(first_note(late).find("both need one clock"), std::string::npos);
+  EXPECT_NE(first_note(late).find("both must use one clock"), std::string::npos);
   auto sparse = flight;
   keep_every(sparse, 300);
   // A range right beside one of the few positions has its place; the others do not.

@@ -68,8 +68,9 @@ TEST(RegionReason, IsThatOfTheAnchorsThatAreTooWideAlone) {
   const Estimate& wide = anchors[2].estimate;
   ASSERT_EQ(wide.verdict, Verdict::ok);
   ASSERT_FALSE(gate(wide, "precision").passed);
-  EXPECT_TRUE(wide.reason.starts_with(
-      "its region is too wide for its distance; the largest part of its uncertainty is the range bias ("))
+  EXPECT_TRUE(
+      wide.reason.starts_with("its region of uncertainty is too large for its distance; the largest part of "
+                              "its uncertainty is the range bias ("))
       << wide.reason;
   ASSERT_TRUE(gate(anchors[0].estimate, "precision").passed);
   EXPECT_FALSE(says(gate(anchors[0].estimate, "precision").why, "largest part"));

@@ -79,7 +79,7 @@ TEST(FlightPlan, StopsByGainAndSaysSo) {
   const auto few = plan_flight({k_hall, 6, {}, {}}, thrifty).value();
   EXPECT_LT(few.n_measure, many.n_measure);
   EXPECT_LT(many.rms_m, few.rms_m);
-  EXPECT_THAT(few.reason, testing::HasSubstr("% only"));
+  EXPECT_THAT(few.reason, testing::HasSubstr("by only"));
 }
 
 TEST(FlightPlan, StaysInsideTheFenceAndOutOfNoFly) {

@@ -96,7 +96,7 @@ TEST(NextPoint, SaysSoWhenThereIsNowhereToGo) {
   flight.input.bounds.fence = {{2.9, -0.1}, {3.1, -0.1}, {3.1, 0.1}, {2.9, 0.1}};
   const auto decision = next_point(flight.input, flight.options).value();
   EXPECT_FALSE(decision.chosen);
-  EXPECT_THAT(decision.reason, testing::HasSubstr("nowhere to go"));
+  EXPECT_THAT(decision.reason, testing::HasSubstr("no point left to fly to"));
   EXPECT_THAT(decision.reason, testing::HasSubstr("8 outside_fence"));
 }
 

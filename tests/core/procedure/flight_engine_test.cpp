@@ -356,7 +356,7 @@ TEST(FlightEngine, IsCompletedOnlyWhenNothingWasLeftToFly) {
   EXPECT_EQ(ended_by(Step::ranging, {Trigger::land, Trigger::landed}), P(false, "commanded to land"));
   EXPECT_EQ(ended_by(Step::ranging, {Trigger::taken_over, Trigger::landed}),
             P(false, "landed and disarmed without a command"));
-  EXPECT_EQ(ended_by(Step::take_off, {Trigger::not_taken_off}), P(false, "not taken off"));
+  EXPECT_EQ(ended_by(Step::take_off, {Trigger::not_taken_off}), P(false, "did not take off"));
   // Held on the way home, the reason stays; sent to work again, it is not over.
   Flown f;
   ways().at(Step::return_home)(f);
@@ -380,8 +380,9 @@ TEST(FlightEngine, ATakeOffWhereItIsNotAllowedIsNotFlownAndSaysWhyInMetres) {
   EXPECT_TRUE(f.engine.take_commands().empty()) << "nothing is armed for a flight that is refused";
   EXPECT_EQ(f.engine.state().step, Step::done);
   EXPECT_FALSE(f.engine.state().completed);
-  EXPECT_EQ(f.engine.state().ended,
-            "not taken off: no take-off from here: 2.0 m from the building or a no-fly area, 4.0 m are kept");
+  EXPECT_EQ(
+      f.engine.state().ended,
+      "did not take off: no take-off from here: 2.0 m from the building or a no-fly area, 4.0 m required");
 }
 
 TEST(FlightEngine, TheTimeFlownStandsStillAfterTheLandingAndGoesOnOverARestart) {

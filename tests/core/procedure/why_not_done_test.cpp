@@ -39,14 +39,14 @@ TEST(WhyNotDone, NamesTheFirstCauseWithItsNumbers) {
   EXPECT_EQ(why(good(), {{10, -5, 3}, {10, 0, 9}, {10, 5, 3}}).rfind("seen from one side only", 0), 0u);
   auto refused = good();
   refused.refused["nlos"] = 150;
-  EXPECT_EQ(why(refused), "too many ranges refused: 150 of 250");
+  EXPECT_EQ(why(refused), "too many ranges rejected: 150 of 250");
   auto biased = good();
   biased.bias_sigma_m = 0.3;
   EXPECT_EQ(why(biased), "bias and position cannot be distinguished: bias known to 0.30 m");
   EXPECT_EQ(why(good()), "accuracy 0.300 m, wanted 0.050 m");
   auto held = good();
   held.best->covariance_m2 *= 0.01;
-  EXPECT_EQ(why(held), "more points wanted");
+  EXPECT_EQ(why(held), "more points needed");
   held.gates = {{"redundancy", 90, 30, true, ""}, {"halves", 40, 16, false, "the halves disagree"}};
   EXPECT_EQ(why(held), "the halves disagree");
 }

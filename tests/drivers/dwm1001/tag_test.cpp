@@ -99,13 +99,13 @@ TEST(Dwm1001, SaysWhyNothingCanBeHadOfIt) {
   Wire dead({});
   dead.take(EventKind::opened);
   dead.run(10'000, true);
-  EXPECT_EQ(dead.sink.hung_up, "no DWM1001 shell answers: is this its port, at 115200 baud?");
+  EXPECT_EQ(dead.sink.hung_up, "no DWM1001 shell answers: is this the right port, at 115200 baud?");
   sim::Dwm1001::Options mute;
   mute.says_id = false;
   Wire unnamed(mute);
   unnamed.take(EventKind::opened);
   unnamed.run(8000);
-  EXPECT_EQ(unnamed.sink.hung_up, "its shell does not say the id (si): set the option tag");
+  EXPECT_EQ(unnamed.sink.hung_up, "its shell does not show the id (command si): set the option tag");
   Wire named(mute, R"({"tag":"0x0077"})");
   named.take(EventKind::opened);
   named.run(8000);
@@ -113,7 +113,7 @@ TEST(Dwm1001, SaysWhyNothingCanBeHadOfIt) {
   ASSERT_FALSE(named.sink.ranges.empty());
   EXPECT_EQ(named.sink.ranges[0].tag, NetworkId{0x77});
   named.take(EventKind::command, device::to_json(device::Command{3, "reboot", ""}));
-  EXPECT_EQ(named.sink.answers.at(3), "error: a DWM1001 takes no commands here");
+  EXPECT_EQ(named.sink.answers.at(3), "error: a DWM1001 does not support commands");
 }
 
 TEST(Dwm1001, IsPolledInBinaryAndARepeatedAnswerIsNoMeasurement) {
@@ -169,10 +169,10 @@ TEST(Dwm1001, NamesTheOptionThatIsWrong) {
     return done ? "" : done.error().message;
   };
   EXPECT_EQ(why("{}"), "");
-  EXPECT_EQ(why(R"({"mode":"spi"})"), "mode: one of shell, tlv");
-  EXPECT_EQ(why(R"({"mode":"tlv"})"), "tag: is needed in binary: an id like 0x022e");
-  EXPECT_EQ(why(R"({"tag":7})"), "tag: an id like 0x022e");
-  EXPECT_EQ(why(R"({"baud":7})"), "baud: a dwm1001 device has mode, tag");
+  EXPECT_EQ(why(R"({"mode":"spi"})"), "mode: must be one of shell, tlv");
+  EXPECT_EQ(why(R"({"mode":"tlv"})"), "tag: is needed in binary mode: give an id like 0x022e");
+  EXPECT_EQ(why(R"({"tag":7})"), "tag: must be an id like 0x022e");
+  EXPECT_EQ(why(R"({"baud":7})"), "baud: no such option: a dwm1001 device has mode, tag");
 }
 
 }  // namespace

@@ -26,16 +26,16 @@ TEST(Mapping, NamesEveryFaultWithItsPlaceAndWhatWouldBeRight) {
       why(R"({"tag":"t","anchor":{"pointer":"/a","value":"1"},"distance":{"pointer":"/d","unit":"furlong"},
     "time":{"pointer":"/t","unit":"h","clock":"sun"},"rssi":"/r","id_format":"roman","rss":{"pointer":"/r","scale":0},
     "array":{"pointer":"/x"},"topic":"a/#/b","ids":{"kitchen":"red"}})");
-  for (const char* one : {"mapping/rssi: there is no such key; there are topic, array,",
-                          "mapping/tag: \"t\" is no JSON pointer: like \"/tag/id\" in the element, \"#/tag\" "
-                          "in the whole message",
+  for (const char* one : {"mapping/rssi: there is no such key; the keys are topic, array,",
+                          "mapping/tag: \"t\" is not a JSON pointer: write \"/tag/id\" for the element, "
+                          "\"#/tag\" for the whole message",
                           "mapping/anchor: needs one of pointer, topic_level, value",
                           "mapping/distance/unit: must be one of m, cm, mm, ft",
                           "mapping/time/unit: must be one of s, ms, us, ns, rfc3339",
                           "mapping/time/clock: must be utc (Unix time) or device (since it was switched on)",
                           "mapping/id_format: must be one of any, decimal, hex",
                           "mapping/rss/scale: must be a number other than 0",
-                          "mapping/array: must be a JSON pointer; \"\" is the whole message",
+                          "mapping/array: must be a JSON pointer; \"\" means the whole message",
                           "mapping/topic: '#' must be the whole last level",
                           "mapping/ids/kitchen: must be an id like \"0x6a2f\""})
     EXPECT_NE(all.find(one), std::string::npos) << one << "\n in " << all;

@@ -210,7 +210,7 @@ TEST(Ndjson, NamesTheOptionThatIsWrong) {
         .error()
         .message;
   };
-  EXPECT_EQ(why("{}"), "mapping: is needed, an object that says where each value is");
+  EXPECT_EQ(why("{}"), "mapping: is needed: an object that gives the place of each value");
   EXPECT_EQ(why(R"({"format":"x"})"), "format: an ndjson device has mapping");
   EXPECT_NE(why(R"({"mapping":{"tag":"/t"}})").find("mapping/anchor: is needed"), std::string::npos);
   EXPECT_NE(

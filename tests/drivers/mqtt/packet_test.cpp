@@ -61,12 +61,12 @@ TEST(MqttPacket, ThatIsTooLargeIsSkippedWithoutBeingHeld) {
   std::string got = read(reader, "\x30\x80\xad\xe2\x04"s);
   for (int i = 0; i < 10'000; ++i) got += read(reader, std::string(1000, 'x'));
   EXPECT_EQ(got + read(reader, "\xd0\0"s), "- 13.0: ");
-  EXPECT_EQ(read(reader, "\x20\x65"s), "!a packet of 101 bytes that is no message");
+  EXPECT_EQ(read(reader, "\x20\x65"s), "!a packet of 101 bytes that is not a message");
 }
 
 TEST(MqttPacket, WithALengthOfFiveBytesEndsTheConnection) {
   PacketReader reader(100);
-  EXPECT_EQ(read(reader, "\x30\xff\xff\xff\xff\x7f"s), "!a length of more than four bytes: this is no MQTT");
+  EXPECT_EQ(read(reader, "\x30\xff\xff\xff\xff\x7f"s), "!a length of more than four bytes: this is not MQTT");
   reader.clear();
   EXPECT_EQ(read(reader, "\xd0\0"s), "13.0: ");
 }

@@ -105,7 +105,7 @@ TEST(MqttSubscriber, PingsAQuietBrokerAndLeavesADeadOne) {
     d.now_ns = *d.pipeline.deadline_ns(1);
     d.take(EventKind::tick);
   }
-  EXPECT_EQ(d.sink.hung_up, "the broker does not answer any more");
+  EXPECT_EQ(d.sink.hung_up, "the broker no longer answers");
 }
 
 TEST(MqttSubscriber, SaysWhyABrokerIsOfNoUse) {
@@ -121,14 +121,14 @@ TEST(MqttSubscriber, SaysWhyABrokerIsOfNoUse) {
     EXPECT_TRUE(d.sink.ranges.empty()) << "a connection that is given up makes no rows";
     return d.sink.hung_up;
   };
-  EXPECT_EQ(why("\x20\x02\0\x04"s), "the broker refuses user or password");
-  EXPECT_EQ(why("\x20\x02\0\x05"s), "the broker does not authorize us: check user and password");
-  EXPECT_EQ(why("\x20\x02\0\x01"s), "the broker does not speak MQTT 3.1.1");
+  EXPECT_EQ(why("\x20\x02\0\x04"s), "the broker rejects the user or the password");
+  EXPECT_EQ(why("\x20\x02\0\x05"s), "the broker does not authorize this connection: check user and password");
+  EXPECT_EQ(why("\x20\x02\0\x01"s), "the broker does not support MQTT 3.1.1");
   EXPECT_EQ(why("\x20\x02\0\0\x90\x03\0\x01\x80"s),
-            "the broker refuses the subscription to \"uwb/+/ranges\"");
-  EXPECT_EQ(why("HTTP/1.1 400 Bad Request\r\n\r\n"), "this is no MQTT broker");
-  EXPECT_EQ(why("\x20\x02\0\0\x40\x02\0\x01"s), "a packet of type 4, which no broker sends");
-  EXPECT_EQ(why("\x20\x03\0\0\0"s), "this is no MQTT broker");
+            "the broker rejects the subscription to \"uwb/+/ranges\"");
+  EXPECT_EQ(why("HTTP/1.1 400 Bad Request\r\n\r\n"), "this is not an MQTT broker");
+  EXPECT_EQ(why("\x20\x02\0\0\x40\x02\0\x01"s), "a packet of type 4, which a broker never sends");
+  EXPECT_EQ(why("\x20\x03\0\0\0"s), "this is not an MQTT broker");
   EXPECT_EQ(why("", 10 * k_s), "no answer: is this an MQTT broker, without TLS?");
   EXPECT_EQ(why("\x20\x02\0\0"s, 10 * k_s), "no answer to the subscription");
 }
@@ -162,17 +162,19 @@ TEST(MqttSubscriber, NamesTheOptionThatIsWrong) {
   };
   EXPECT_EQ(why(k_ranges), "");
   EXPECT_EQ(why(R"({"format":"pozyx"})"), "");
-  EXPECT_EQ(why("{}"), "mapping: is needed, an object that says where each value is");
-  EXPECT_EQ(why(R"({"format":"omlox"})"), "format: one of mapping, pozyx");
+  EXPECT_EQ(why("{}"), "mapping: is needed: an object that gives the place of each value");
+  EXPECT_EQ(why(R"({"format":"omlox"})"), "format: must be one of mapping, pozyx");
   EXPECT_EQ(why(R"({"format":"pozyx","topic":"a#"})"), "topic: '#' must be the whole last level");
-  EXPECT_EQ(why(R"({"qos":1})"), "qos: an mqtt device has format, mapping, topic, user, password");
+  EXPECT_EQ(why(R"({"qos":1})"),
+            "qos: no such option: an mqtt device has format, mapping, topic, user, password");
   Json no_topic = Json::parse(k_ranges);
   no_topic["mapping"].erase("topic");
   EXPECT_EQ(why(no_topic.dump()), "mapping/topic: is needed, like \"uwb/+/ranges\"");
   no_topic["topic"] = "a/+";
   EXPECT_EQ(why(no_topic.dump()), "");
   no_topic["format"] = "pozyx";
-  EXPECT_EQ(why(no_topic.dump()), "mapping: the format pozyx has its own; take one of them out");
+  EXPECT_EQ(why(no_topic.dump()),
+            "mapping: the format pozyx has a mapping of its own: remove one of the two");
 }
 
 // Recorded messages of C-Deck/CattleTrackerPozyx have this form; the numbers are those of

@@ -133,13 +133,13 @@ TEST(NtripClient, SaysWhyThereIsNoStream) {
     EXPECT_EQ(link.to_rover(), "");
     return link.sink.hung_up;
   };
-  EXPECT_EQ(why("HTTP/1.0 401 Unauthorized\r\n"), "the caster rejects user or password");
+  EXPECT_EQ(why("HTTP/1.0 401 Unauthorized\r\n"), "the caster rejects the user or the password");
   EXPECT_EQ(why("HTTP/1.1 404 Not Found\r\n"), "the caster has no mount \"BASE\"");
   EXPECT_EQ(why("HTTP/1.1 503 Busy\r\n"), "the caster answers \"HTTP/1.1 503 Busy\"");
   EXPECT_EQ(why("SOURCETABLE 200 OK\r\nServer: x\r\n\r\nCAS;a;b\r\nSTR;NEAR;Gent;RTCM "
                 "3.2;\r\nSTR;FAR;x;\r\nENDSOURCETABLE\r\n"),
             "the caster has no mount \"BASE\"; it has NEAR, FAR");
-  EXPECT_EQ(why(std::string(20'000, 'x')), "the caster's answer is no NTRIP");
+  EXPECT_EQ(why(std::string(20'000, 'x')), "the caster's answer is not NTRIP");
   // In Latin-1, and cut at 80 bytes: the text is UTF-8 and ends between characters.
   EXPECT_EQ(why("ICY 4\xff\xfe"
                 "1 Nicht erlaubt\r\n"),
@@ -153,7 +153,7 @@ TEST(NtripClient, SaysWhyThereIsNoStream) {
   silent.take(EventKind::opened, 2);
   silent.now_ns += 11'000'000'000;
   silent.take(EventKind::tick, 2);
-  EXPECT_EQ(silent.sink.hung_up, "no answer of the caster within 10 s");
+  EXPECT_EQ(silent.sink.hung_up, "no answer from the caster within 10 s");
 }
 
 TEST(NtripClient, TellsTheRoversPositionAtOnceAndEachTenSeconds) {

@@ -158,7 +158,7 @@ TEST(PozyxUnit, HangsUpOnWhatIsNoPozyx) {
   scenario.faults = {{"tag", sim::FaultKind::silence, 0, 1e5}};
   Flight flight("{}", scenario);
   flight.run(10);
-  EXPECT_EQ(flight.sink.hung_up, "no Pozyx answers on this port");
+  EXPECT_EQ(flight.sink.hung_up, "no Pozyx tag answers on this port");
   scenario.faults.clear();
   scenario.tags[0].firmware = 0x01;
   Flight old("{}", scenario);

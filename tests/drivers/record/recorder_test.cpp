@@ -174,7 +174,7 @@ TEST(Recorder, LeavesTheLastOfTheDiskToTheRows) {
   for (const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(20);
        recorder->failed().empty() && std::chrono::steady_clock::now() < end; ++n)
     recorder->take({EventKind::bytes, 3, {UtcTime{n}, n}, "a chunk of bytes"});
-  EXPECT_NE(recorder->failed().find("MiB free on the disk, which rows need"), std::string::npos);
+  EXPECT_NE(recorder->failed().find("MiB free on the disk, kept for measurements"), std::string::npos);
   EXPECT_GT(recorder->events_lost(), 0U);
 }
 

@@ -37,11 +37,13 @@ TEST(ScenarioFile, NamesWhatIsWrong) {
     return read ? std::string() : read.error().message;
   };
   EXPECT_EQ(why(""), "");
-  EXPECT_EQ(why(R"(,"sead":1)"), "/sead is not known here");
+  EXPECT_EQ(why(R"(,"sead":1)"), "/sead is not a known key");
   EXPECT_EQ(why(R"(,"world":{"walls":[{"from_m":[0,0],"to_m":[1]}]})"),
             "/world/walls/0/to_m must be 2 numbers");
-  EXPECT_EQ(why(R"(,"rovers":[{"format":"xml"}])"), "/rovers/0/format is one of nmea, ubx, erb, llh, gpsd");
-  EXPECT_EQ(why(R"(,"faults":[{"device":"nobody","kind":"zero"}])"), "a fault names no device: nobody");
+  EXPECT_EQ(why(R"(,"rovers":[{"format":"xml"}])"),
+            "/rovers/0/format must be one of nmea, ubx, erb, llh, gpsd");
+  EXPECT_EQ(why(R"(,"faults":[{"device":"nobody","kind":"zero"}])"),
+            "a fault names an unknown device: nobody");
   EXPECT_EQ(why(R"(,"seed":1.5)"), "/seed must be a whole number up to 9007199254740992");
   EXPECT_NE(why(R"(,"world":{"walls":[{"from_m":[0,0],"to_m":[1,0],"material":"mud"}]})"), "");
   EXPECT_FALSE(parse_scenario("{"));

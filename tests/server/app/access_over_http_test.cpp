@@ -63,10 +63,10 @@ TEST(Refusals, AreInTheAuditLogAndCounted) {
   do {
     audit = server.call("GET", "/api/v1/audit", {}, server.bearer(server.admin)).body;
     std::this_thread::yield();
-  } while (audit.find("a token that is not known") == std::string::npos &&
+  } while (audit.find("a token that is unknown") == std::string::npos &&
            std::chrono::steady_clock::now() < deadline);
   EXPECT_NE(audit.find("GET /api/v1/audit"), std::string::npos) << audit;
-  EXPECT_NE(audit.find("a token that is not known"), std::string::npos) << audit;
+  EXPECT_NE(audit.find("a token that is unknown"), std::string::npos) << audit;
   EXPECT_EQ(audit.find("anc_guess"), std::string::npos) << "no secrets in the log";
 }
 

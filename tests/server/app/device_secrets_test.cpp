@@ -161,7 +161,7 @@ TEST(DeviceSecrets, AKeptDeviceThatNamesAFileIsNotStartedUntilItsPasswordIsSent)
   const auto shown = server.call("GET", "/api/v1/devices/" + id, {}, server.bearer(admin));
   ASSERT_EQ(shown.status, 200) << shown.body;
   EXPECT_EQ(Json::parse(shown.body)["state"], "off") << shown.body;
-  EXPECT_NE(shown.body.find("password_file is not read any more"), std::string::npos) << shown.body;
+  EXPECT_NE(shown.body.find("password_file is no longer used"), std::string::npos) << shown.body;
   auto change = server.bearer(admin);
   change["If-Match"] = "*";
   EXPECT_EQ(
@@ -250,7 +250,7 @@ TEST(DeviceAddresses, OpenNothingThatIsNoTerminalLine) {
     do {
       shown = server.call("GET", made.headers.at("location"), {}, pilot).body;
     } while (Json::parse(shown)["reason"].is_null() && std::chrono::steady_clock::now() < end);
-    EXPECT_NE(shown.find("this is no serial port"), std::string::npos) << address << " " << shown;
+    EXPECT_NE(shown.find("this is not a serial port"), std::string::npos) << address << " " << shown;
   }
 }
 

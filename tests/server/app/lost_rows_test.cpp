@@ -75,7 +75,7 @@ TEST(LostRows, AreAnAlarmWithTheirNumberAndComeBackFromTheRecordingThatItNames) 
   std::string text;
   const auto agrees = [&] {
     text = lost();
-    return text.starts_with(std::to_string(missing()) + " rows of devices were not stored");
+    return text.starts_with(std::to_string(missing()) + " measurements of devices have not been stored");
   };
   const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(20);
   while (!agrees() && std::chrono::steady_clock::now() < deadline)

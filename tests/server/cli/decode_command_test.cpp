@@ -111,8 +111,8 @@ TEST_F(DecodeCommand, TellsWhyThereIsNothing) {
   for (const auto& [log, arguments, why] :
        {std::tuple<std::string, const char*, const char*>{"", "", "the input is empty"},
         {sentence("GPHDT,12.3,T"), "", "1 nmea frames of 18 bytes\nno position among them"},
-        {"once upon a time\n", "", "nothing in it is NMEA, UBX, ERB, LLH or gpsd JSON"},
-        {k_epoch, "--format ubx", "nothing in it is of this format: --format auto looks for all"},
+        {"once upon a time\n", "", "it contains no NMEA, UBX, ERB, LLH or gpsd JSON"},
+        {k_epoch, "--format ubx", "it contains nothing of this format: --format auto accepts all formats"},
         {std::string("\xff\xfe$\0G\0", 6), "", "UTF-16"}}) {
     const auto answer = decode(log, arguments);
     EXPECT_EQ(answer.exit_code, 1) << why;

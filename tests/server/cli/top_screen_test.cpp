@@ -58,7 +58,7 @@ cli::TopDocuments empty_server() {
                         .dump();
   out.alarms.body = out.devices.body = out.missions.body = out.jobs.body = list({});
   out.metrics.body =
-      "# HELP anchord_live_queue_rows Rows that wait for the live estimates\n"
+      "# HELP anchord_live_queue_rows Rows that are waiting for the live estimates\n"
       "# TYPE anchord_live_queue_rows gauge\n"
       "anchord_live_queue_rows 2\n"
       "anchord_command_queue 0\n"
@@ -97,17 +97,19 @@ TEST(TopScreen, ShowsVersionHealthAndQueuesOfAServerWithNothingToDo) {
             std::string::npos)
       << text;
   EXPECT_NE(text.find("ALARMS\n  none\n"), std::string::npos) << text;
-  EXPECT_NE(text.find("MISSION IN FLIGHT\n  no mission records\n"), std::string::npos) << text;
+  EXPECT_NE(text.find("MISSION IN FLIGHT\n  no mission is recording\n"), std::string::npos) << text;
   EXPECT_NE(text.find("JOBS\n  none queued or running\n"), std::string::npos) << text;
-  EXPECT_TRUE(line_with(text, "rows to be stored").ends_with(" 3")) << text;
+  EXPECT_TRUE(line_with(text, "rows waiting for storage").ends_with(" 3")) << text;
   EXPECT_TRUE(line_with(text, "live estimates").ends_with(" 2")) << text;
   EXPECT_TRUE(line_with(text, "computations").ends_with(" -")) << "not in the metrics: " << text;
   EXPECT_NE(text.find("4120 accepted, 8 duplicate, 31 rejected"), std::string::npos) << text;
 }
 
 TEST(TopScreen, SaysWhatToDoWhenThereAreNoDevices) {
-  EXPECT_NE(screen(empty_server()).find("DEVICES\n  none is set up: anchord devices discover, then add\n"),
-            std::string::npos);
+  EXPECT_NE(
+      screen(empty_server())
+          .find("DEVICES\n  no device is set up: run anchord devices discover, then anchord devices add\n"),
+      std::string::npos);
 }
 
 TEST(TopScreen, ShowsADeviceWithStateRateAgeAndRejectedUnderTitlesWithUnits) {
@@ -126,7 +128,8 @@ TEST(TopScreen, ShowsADeviceWithStateRateAgeAndRejectedUnderTitlesWithUnits) {
   for (const char* cell : {"gnss", "TALKING", " 5.0", " 2.3", " 12"})
     EXPECT_NE(row.find(cell), std::string::npos) << row;
   EXPECT_NE(line_with(text, "LOST").find("no such port"), std::string::npos) << text;
-  EXPECT_NE(text.find("Radios in the rows: 1, last seen 0.4 s ago\n"), std::string::npos) << text;
+  EXPECT_NE(text.find("Radios seen in the measurements: 1, last seen 0.4 s ago\n"), std::string::npos)
+      << text;
 }
 
 TEST(TopScreen, ShowsTheMissionThatRecordsWithItsAircraftAndLeavesFinishedOnesOut) {
@@ -247,7 +250,8 @@ TEST(TopScreen, MarksOldDataAndShowsSinceWhenTheServerIsAway) {
   away.now = UtcTime::from_us(k_now_us + 34'000'000);
   away.away = cli::TopAway{UtcTime::from_us(k_now_us + 1'000'000), "connection refused"};
   const auto text = joined(top_lines(empty_server(), away, {}));
-  EXPECT_NE(text.find("SERVER AWAY since 2026-05-04 10:11:13 UTC: connection refused\n"), std::string::npos)
+  EXPECT_NE(text.find("SERVER NOT REACHABLE since 2026-05-04 10:11:13 UTC: connection refused\n"),
+            std::string::npos)
       << text;
   EXPECT_NE(text.find("OLD data of 2026-05-04 10:11:12 UTC, 34 s ago"), std::string::npos) << text;
   for (const char* title : {"ALARMS - OLD\n", "DEVICES - OLD\n", "QUEUES - OLD\n", "JOBS - OLD\n"})

@@ -114,7 +114,7 @@ TEST_F(VerifyCommand, RefusesAnotherServersSignature) {
   EXPECT_EQ(verify(quoted("pack.zip")).exit_code, 0) << "whole in itself: its own key says so";
   const auto answer = verify(quoted("pack.zip") + " --key " + quoted("server.pem"));
   EXPECT_EQ(answer.exit_code, 1);
-  EXPECT_THAT(answer.out, HasSubstr("the signature is not one of key " + key_.open_half().id()));
+  EXPECT_THAT(answer.out, HasSubstr("the signature does not match key " + key_.open_half().id()));
 }
 
 TEST_F(VerifyCommand, SaysWhatCannotBeUsed) {
@@ -124,7 +124,7 @@ TEST_F(VerifyCommand, SaysWhatCannotBeUsed) {
   save("no.pem", "no key");
   EXPECT_EQ(verify(quoted("absent.zip")).exit_code, 2);
   EXPECT_EQ(verify(quoted("cut.zip")).exit_code, 2);
-  EXPECT_THAT(verify(quoted("text.zip")).err, HasSubstr("no whole zip file"));
+  EXPECT_THAT(verify(quoted("text.zip")).err, HasSubstr("not a complete zip file"));
   EXPECT_EQ(verify(quoted("pack.zip") + " --key " + quoted("no.pem")).exit_code, 2);
   EXPECT_EQ(verify(quoted("pack.zip") + " --key " + quoted("absent.pem")).exit_code, 2);
 }
@@ -143,7 +143,7 @@ TEST_F(VerifyCommand, ReadsABundleAlone) {
     ASSERT_TRUE(zip.value().finish());
     const auto answer = verify(quoted(name));
     EXPECT_EQ(answer.exit_code, same ? 0 : 1) << answer.out << answer.err;
-    EXPECT_THAT(answer.out, HasSubstr(same ? "not signed" : "tables/a.ndjson has another digest"));
+    EXPECT_THAT(answer.out, HasSubstr(same ? "not signed" : "tables/a.ndjson does not have the digest"));
   }
 }
 

@@ -374,7 +374,7 @@ TEST(HttpLimitsTest, RefusesConnectionsWhenAllAreAtWorkAndRecovers) {
   RawSocket third(server.port);
   EXPECT_TRUE(third.read_to_end());
   EXPECT_EQ(status_of(third.input), 503);
-  EXPECT_NE(third.input.find("all 2 connections are at work"), std::string::npos) << third.input;
+  EXPECT_NE(third.input.find("all 2 connections are in use"), std::string::npos) << third.input;
   EXPECT_NE(third.input.find("Retry-After: 5"), std::string::npos);
   server.gateway.release();
   EXPECT_EQ(status_of(first.response()), 200);

@@ -167,7 +167,7 @@ TEST_F(MqttBroker, StopsAtOnceWhereNobodyAnswersAndSaysSo) {
   auto slow = options(ntohs(at.sin_port));
   slow.answer = 1000ms;
   auto broker = started(slow, source);
-  EXPECT_TRUE(eventually([&] { return broker->status().reason == "no answer of the broker within 1 s"; }))
+  EXPECT_TRUE(eventually([&] { return broker->status().reason == "no answer from the broker within 1 s"; }))
       << broker->status().reason;
   EXPECT_EQ(source.asked(), 0);
   const auto begun = std::chrono::steady_clock::now();

@@ -159,7 +159,8 @@ TEST_P(BundleStoreContract, AreRefusedWholeWhereAMeasurementDiffers) {
   EXPECT_FALSE(other->stores().missions.mission(mission)) << "nothing of it stays";
 }
 
-// A second flight of the kit was refused with 409 "kit_profile kit 2 is here with other content (t_ns)".
+// A second flight of the kit was refused with 409 "kit_profile kit 2 exists on this server with other content
+// (t_ns)".
 TEST_P(BundleStoreContract, OfALaterFlightOfTheKitComeWhereTheProfileIsTheSameOrAnother) {
   const auto first = flown();
   Rows of_first = written(*db_, first);
@@ -212,9 +213,10 @@ TEST_P(BundleStoreContract, LeaveSitesFramesAndAnchorsAsTheyAreHere) {
   const auto taken = here.bundles.take_in(mission, rows);
   ASSERT_TRUE(taken) << taken.error().message;
   EXPECT_THAT(left_out(taken.value()),
-              ::testing::UnorderedElementsAre(::testing::HasSubstr("(name), which stays"),
-                                              ::testing::HasSubstr("another frame is called hall-a here"),
-                                              ::testing::HasSubstr("anchor 0x0101")));
+              ::testing::UnorderedElementsAre(
+                  ::testing::HasSubstr("(name), which stays"),
+                  ::testing::HasSubstr("another frame has the name hall-a on this server"),
+                  ::testing::HasSubstr("anchor 0x0101")));
   EXPECT_EQ(here.sites.site(site.id).value().name, "hall 3");
   EXPECT_EQ(here.anchors.anchor(NetworkId{0x101}).value().name, "");
   EXPECT_EQ(written(*other, mission).tables.at("uwb_range"), rows.tables.at("uwb_range"));

@@ -137,7 +137,7 @@ TEST_F(Postgres, RefusesADatabaseOfANewerProgram) {
   const auto refused = migrated(older);
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().code, Errc::unsupported);
-  EXPECT_THAT(refused.error().message, HasSubstr("knows up to 3"));
+  EXPECT_THAT(refused.error().message, HasSubstr("supports versions up to 3"));
 }
 
 TEST_F(Postgres, RefusesADatabaseThatIsNotOurs) {

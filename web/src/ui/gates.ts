@@ -11,7 +11,7 @@ interface Words {
 }
 const WORDS: Record<string, Words> = {
   redundancy: {
-    passes: 'Ranges beyond the unknowns',
+    passes: 'Number of ranges minus unknowns',
     fails: 'Too few ranges beyond the unknowns',
     unit: '',
     least: true,
@@ -48,7 +48,7 @@ const WORDS: Record<string, Words> = {
   },
   halves: { passes: 'The two halves of the flight agree', fails: 'The two halves of the flight disagree', unit: 'χ²' },
   flights: { passes: 'The flights agree', fails: 'The flights disagree', unit: 'χ²' },
-  moved: { passes: 'It is where it was', fails: 'It moved, or one of the answers is wrong', unit: 'χ²' },
+  moved: { passes: 'Same position as before', fails: 'It moved, or one of the answers is wrong', unit: 'χ²' },
   bias: { passes: 'Range bias of the kit is known, σ', fails: 'Range bias of the kit is not known, σ', unit: 'm' },
   lever_arm: { passes: 'The lever arm fits the flight', fails: 'The lever arm does not fit the flight', unit: 'σ' },
   unseen_arm: {
@@ -57,7 +57,7 @@ const WORDS: Record<string, Words> = {
     unit: 'm',
   },
   track_shift: {
-    passes: 'The track came back from its gaps where it was',
+    passes: 'No shift of the track at its gaps',
     fails: 'A part of the track is shifted against the rest: wrong fix, or a base set up anew',
     unit: 'χ²',
   },
@@ -67,7 +67,7 @@ const WORDS: Record<string, Words> = {
     unit: '%',
   },
   profile: {
-    passes: 'The kit is as its other flights found it',
+    passes: 'The kit agrees with its other flights',
     fails: 'The kit is not as its other flights found it',
     unit: 'χ²',
   },

@@ -18,7 +18,7 @@ export const SOURCE_WORDS: Record<string, string> = {
   lever_arm: 'lever arm',
   clock: 'time lag',
   base: 'base station',
-  floor: 'what no residual shows',
+  floor: 'errors that no residual shows',
 };
 export const sentence = (text: string): string =>
   text ? `${text[0]!.toUpperCase()}${text.slice(1)}${/[.!?]$/.test(text) ? '' : '.'}` : '';

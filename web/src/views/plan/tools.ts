@@ -97,7 +97,7 @@ function spaced(outline: readonly Point[], distance_m: number, spacing_m: number
 }
 
 const ROUND_MAX_RAD = 1.6; ///< one corner of the way turns by a right angle at most: sharper ones stand far off
-/// Corners of the way between two neighbours where the straight one comes too near to a wall: where their tangents meet.
+/// Corners of the way between two neighbours where the straight one comes too close to a wall: where their tangents meet.
 function round_corner(a: OnCurve, b: OnCurve, outline: readonly Point[], keep_out: number): Point[] {
   const steps = Math.ceil(away(a.at, b.at) / FINE_M),
     near = Array.from({ length: steps }, (_, k): Point => [

@@ -263,8 +263,8 @@ function fixes_of(
     /// What can be no place of this kind; looked at in each row, for the first ones may look otherwise.
     wrong_place = (at: readonly [number, number, number] | null): string => {
       // Both zero is what a receiver without a fix writes.
-      if (at === null || (at[0] === 0 && at[1] === 0 && !own_frame)) return 'no place';
-      if (!local) return Math.abs(at[0]) > 180 || Math.abs(at[1]) > 90 ? 'latitude or longitude is no degrees' : '';
+      if (at === null || (at[0] === 0 && at[1] === 0 && !own_frame)) return 'no position';
+      if (!local) return Math.abs(at[0]) > 180 || Math.abs(at[1]) > 90 ? 'latitude or longitude is not in degrees' : '';
       return own_frame && at.some((v) => Math.abs(v) > MOST_LOCAL_M)
         ? 'x, y, z are more than 100 km from zero: a coordinate system is needed'
         : '';
@@ -291,7 +291,7 @@ function fixes_of(
       at = at_of(row),
       wrong = Number.isFinite(t_us)
         ? wrong_place(at)
-        : `"${time(row)}" is no time that is known (2026-05-04 10:00:01.5)`;
+        : `"${time(row)}" is not a time that can be read (like 2026-05-04 10:00:01.5)`;
     if (at === null || wrong) {
       refused.push(`${t.name} row ${i + 2}: ${wrong}`);
       return [];
@@ -339,7 +339,7 @@ function ranges_of(
         : !who
           ? 'no anchor'
           : !Number.isFinite(t_us)
-            ? `"${time!(row)}" is no time that is known (2026-05-04 10:00:01.5)`
+            ? `"${time!(row)}" is not a time that can be read (like 2026-05-04 10:00:01.5)`
             : !Number.isFinite(distance)
               ? 'no range'
               : '';
@@ -350,7 +350,7 @@ function ranges_of(
     const address = address_of(who);
     if (!is_address(who)) {
       const other = names.get(address) ?? who;
-      if (other !== who) throw new Error(`the names "${who}" and "${other}" give one address: rename one of them`);
+      if (other !== who) throw new Error(`the names "${who}" and "${other}" give the same address: rename one of them`);
       names.set(address, who);
     }
     return [

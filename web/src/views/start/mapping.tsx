@@ -114,7 +114,7 @@ export function Mapping({ found, back }: { found: Found; back: () => void }) {
           moved,
           not ? `${grouped(not)} rejected (first: ${flight.refused[0] ?? sent.first_reason})` : '',
           odd
-            ? `${grouped(odd[1])} positions have the fix class "${odd[0]}", which is not known: they count as no fix`
+            ? `${grouped(odd[1])} positions have the fix class "${odd[0]}", which is unknown: they count as no fix`
             : '',
           sent.unnamed ? `${sent.unnamed} names of anchors could not be kept` : '',
         ]

@@ -70,7 +70,7 @@ export function table_of(name: string, text: string): Table {
   if (quotes) throw new Error(`${name} row ${(quotes.row ?? 0) + 1}: a quote is opened and not closed`);
   const decimal = decimal_of(rtklib ? ' ' : read!.meta.delimiter, rows);
   if (columns.every((c) => c !== '' && Number.isFinite(number_of(c, decimal))))
-    throw new Error(`${name}: the first line is numbers, a header line of names is needed`);
+    throw new Error(`${name}: the first line has numbers; a header line with names is needed`);
   const twice = columns.find((c, i) => c !== '' && columns.indexOf(c) !== i);
   if (twice !== undefined) throw new Error(`${name}: two columns have the name "${twice}"`);
   rows.forEach((row, i) => {

@@ -232,7 +232,8 @@ function size_fault(s: Setup): string {
     : '';
 }
 function broker_fault(s: Setup): string {
-  if (s.password && !s.user.trim()) return 'User: missing, and a password needs one. Type it, or clear the password.';
+  if (s.password && !s.user.trim())
+    return 'User: missing, and a password needs a user. Type it, or clear the password.';
   return (
     topic_fault(s.topic.trim()) || (s.payload === 'mapping' ? mapping_fault(s.mapping, s.topic) || size_fault(s) : '')
   );

@@ -82,7 +82,7 @@ const DROPPED: Readonly<Record<string, string>> = {
   bad_power: 'a power outside of -200 to 50 dBm',
   too_many_tags: 'more than 64 tags',
   retained: 'messages that the broker kept from before',
-  write_refused: 'the device takes no more bytes',
+  write_refused: 'the device no longer accepts data',
   write_without_link: 'no receiver to send to',
   port_conflict: 'the port is taken by another device here',
   driver_fault: 'a fault of anchord itself',
@@ -156,7 +156,7 @@ function not_linked(d: Device): Standing {
       'Plug it in and switch it on: it is taken up within a ' +
         `second.${by_id ? '' : ' If the plug moved, Discover finds its new port; a name under by-id stays.'}`,
     );
-  if (/user or password/.test(d.reason))
+  if (/rejects the user/.test(d.reason))
     return bad('REFUSED', reason, 'Edit: check the user, and send the password again.');
   if (/no mount/.test(d.reason)) return bad('NO SUCH MOUNT', reason, 'Edit: take one of the mount points named here.');
   if (/caster|mount/.test(d.reason)) return bad('REFUSED', reason, 'Check address, mount point and NTRIP version.');
@@ -180,7 +180,7 @@ function not_linked(d: Device): Standing {
       'Nobody answers at this address.',
       'Check power, cable or Wi-Fi of the device, and that it is on this network.',
     );
-  if (/no Pozyx answers/.test(d.reason))
+  if (/no Pozyx tag answers/.test(d.reason))
     return d.network_id
       ? silent(d)
       : bad(
@@ -188,7 +188,7 @@ function not_linked(d: Device): Standing {
           'The port is open, but no Pozyx answers on it.',
           'Another device may be in this port: Discover shows which one answers.',
         );
-  if (/silent for too long/.test(d.reason)) return silent(d);
+  if (/received for too long/.test(d.reason)) return silent(d);
   return bad(word, reason || 'The link is gone.', 'It is opened again by itself.');
 }
 function silent(d: Device, noise = /make no frame/.test(d.reason)): Standing {
