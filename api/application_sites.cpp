@@ -1,5 +1,5 @@
-// Requests of tokens that are bound to sites: the one check by route, then the handler, which reads and writes
-// as they may see.
+// Requests of tokens that are bound to sites: the one check by route, then the handler, which reads and
+// writes as they may see.
 #include "api/application_state.hpp"
 #include "api/kit/current_sites.hpp"
 #include "api/kit/problem.hpp"

@@ -124,22 +124,13 @@ Application::State::State(Deps d)
                 },
                 deps.support_files},
       device_api{deps.devices, seen.measurements, stream, jobs, audit},
-      mission_api{
-          missions,     seen.missions, seen.measurements,  seen.sites, seen.bin, stream, events,
-          housekeeping, running,         deps.keep_deleted_ns, deps.clock,   audit,      flights},
+      mission_api{missions,     seen.missions, seen.measurements,    seen.sites, seen.bin, stream, events,
+                  housekeeping, running,       deps.keep_deleted_ns, deps.clock, audit,    flights},
       measurement_api{seen.measurements, ingest, missions,     models, stores.exclusions, events,
-                      deps.clock,          audit,  demonstration},
+                      deps.clock,        audit,  demonstration},
       anchor_answers(stores.revisions, contradictions),
-      anchor_api{seen.sites,
-                 seen.anchors,
-                 seen.calibrations,
-                 seen.revisions,
-                 seen.frames,
-                 missions,
-                 geo,
-                 contradictions,
-                 deps.clock,
-                 audit},
+      anchor_api{seen.sites, seen.anchors, seen.calibrations, seen.revisions, seen.frames,
+                 missions,   geo,          contradictions,    deps.clock,     audit},
       calibration_api{calibrations,
                       seen.calibrations,
                       seen.revisions,
@@ -173,7 +164,7 @@ Application::State::State(Deps d)
       webhook_api{stores.webhooks, webhooks, deps.web_post, deps.clock, audit},
       omlox_api{anchor_api, seen.places, omlox_locations, deps.clock},
       place_api{seen.places, seen.sites, jobs,  deps.run_plan_work,
-                deps.clock,    steady,       audit, [this] { structures.changed(); }},
+                deps.clock,  steady,     audit, [this] { structures.changed(); }},
       bundle_api{
           .bundles = stores.bundles,
           .clock = deps.clock,
@@ -233,7 +224,8 @@ std::unique_ptr<WorkDesk> Application::State::make_desk() {
 
 void Application::State::add_routes() {
   router.on_fault(deps.log_fault);
-  router.run_bound_by([this](const Route& route, const Request& request) { return run_bound(route, request); });
+  router.run_bound_by(
+      [this](const Route& route, const Request& request) { return run_bound(route, request); });
   add_mission_routes(router, mission_api);
   add_mission_bin_routes(router, mission_api);
   add_measurement_routes(router, measurement_api);

@@ -103,8 +103,8 @@ SiteSet read_sites(const json& body, SiteStore& known, std::vector<FieldError>& 
   const auto list = body.find("sites");
   if (list == body.end() || list->is_null()) return {};
   if (!list->is_array() || list->empty() || list->size() > k_max_sites) {
-    faults.push_back({"/sites", "wrong_type",
-                      "null, or a list of 1 to " + std::to_string(k_max_sites) + " ids of sites"});
+    faults.push_back(
+        {"/sites", "wrong_type", "null, or a list of 1 to " + std::to_string(k_max_sites) + " ids of sites"});
     return {};
   }
   std::vector<SiteId> sites;
@@ -211,8 +211,8 @@ void add_access_routes(Router& router, AccessService& access, SiteStore& sites) 
   using enum Method;
   const auto admin = Access::any_of({Role::admin});
   router.add({get, "/api/v1/tokens", admin, [&access](const Request& r) { return list_tokens(access, r); }});
-  router.add(keeps_nothing(
-      {post, "/api/v1/tokens", admin, [&access, &sites](const Request& r) { return create_token(access, sites, r); }}));
+  router.add(keeps_nothing({post, "/api/v1/tokens", admin,
+                            [&access, &sites](const Request& r) { return create_token(access, sites, r); }}));
   router.add(
       {del, "/api/v1/tokens/{id}", admin, [&access](const Request& r) { return revoke_token(access, r); }});
   router.add(keeps_nothing({post, "/api/v1/session", Access::open(),

@@ -96,7 +96,8 @@ Response who_has_control(FlightApi& s, const Request& request) {
   check_query(request, {});
   named_mission(s.missions, request);
   const auto lease = s.flights.control();
-  return json_response(200, lease && !elsewhere(s, lease) ? lease_json(*lease, false) : Ordered{{"held", false}});
+  return json_response(200,
+                       lease && !elsewhere(s, lease) ? lease_json(*lease, false) : Ordered{{"held", false}});
 }
 
 /// The plan that the body of a command names; nothing where it names none, which is an error of its fields.
@@ -261,7 +262,8 @@ Response change_aircraft(FlightApi& s, const Request& request) {
 void refuse_elsewhere(FlightApi& s, bool taking) {
   const auto lease = s.flights.control();
   if (elsewhere(s, lease) && !(taking && !s.flights.flies(lease->mission)))
-    throw_problem(409, "no-control", "the aircraft is commanded for another site: ask whoever runs this server");
+    throw_problem(409, "no-control",
+                  "the aircraft is commanded for another site: ask whoever runs this server");
 }
 
 FlightActions flight_actions(FlightApi& s) {

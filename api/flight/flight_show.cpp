@@ -131,8 +131,7 @@ void FlightService::State::show_profiles(Guard& w) const {
   const auto key = to_string(profiles.mission);
   const auto to = [&](Topic topic) {
     return [&, topic](NetworkId anchor, const nlohmann::ordered_json& one) {
-      deps.hub.publish(topic, to_wire(one), profiles.t_us, key + to_string(anchor), anchor,
-                       profiles.mission);
+      deps.hub.publish(topic, to_wire(one), profiles.t_us, key + to_string(anchor), anchor, profiles.mission);
     };
   };
   w.unlocked([&] {

@@ -221,7 +221,8 @@ Response Router::dispatch(const Route& route, Request& request) const {
   const auto handled = [&](Request& r) {
     try {
       if (r.principal.sites.all()) return route.handler(r);
-      if (!state_->run_bound) return problem(403, "forbidden", "tokens that are bound to sites are refused here");
+      if (!state_->run_bound)
+        return problem(403, "forbidden", "tokens that are bound to sites are refused here");
       return state_->run_bound(route, r);
     } catch (ProblemException& refused) {
       return std::move(refused.response);

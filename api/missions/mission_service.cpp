@@ -1,8 +1,8 @@
 #include "api/missions/mission_service.hpp"
 
 #include "api/admin/event_log.hpp"
-#include "api/missions/mission_service_state.hpp"
 #include "api/kit/current_sites.hpp"
+#include "api/missions/mission_service_state.hpp"
 #include "api/stream/hub.hpp"
 
 namespace anchord::api {

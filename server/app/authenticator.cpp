@@ -238,7 +238,8 @@ Admission Authenticator::live_omlox(const api::Request& request, bool websocket,
     return refused(problem(401, "unauthorized", "send a token as Authorization: Bearer"), route);
   if (!who.roles.empty() && !may_watch_omlox(who)) {
     access_.note_refusal(who.token_id, "GET " + route, request.remote);
-    return refused(problem(403, "forbidden", "live locations need the role viewer and a token of every site"), route);
+    return refused(problem(403, "forbidden", "live locations need the role viewer and a token of every site"),
+                   route);
   }
   if (!websocket) return refused(upgrade_needed("method", "this is a WebSocket: ask for an upgrade"), route);
   Admission admission;

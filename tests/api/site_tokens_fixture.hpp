@@ -93,24 +93,23 @@ class SiteTokens : public AppFixture {
   Firm firm(const std::string& word, std::uint32_t anchor) {
     Firm out;
     out.word = word;
-    const auto site = post("/api/v1/sites", Json{{"name", word + " works"},
-                                                 {"origin", {{"lon", 3.713}, {"lat", 51.023}, {"h_m", 55}}}}
-                                                .dump());
+    const auto site = post(
+        "/api/v1/sites",
+        Json{{"name", word + " works"}, {"origin", {{"lon", 3.713}, {"lat", 51.023}, {"h_m", 55}}}}.dump());
     EXPECT_EQ(site.status, 201) << site.body;
     auto& ids = out.ids;
     ids["site"] = json(site)["id"];
-    const auto token = post("/api/v1/tokens", Json{{"name", word + " crew"},
-                                                   {"roles", {"admin"}},
-                                                   {"sites", {ids["site"]}}}
-                                                  .dump());
+    const auto token =
+        post("/api/v1/tokens",
+             Json{{"name", word + " crew"}, {"roles", {"admin"}}, {"sites", {ids["site"]}}}.dump());
     EXPECT_EQ(token.status, 201) << token.body;
     out.who = access_->verify(json(token)["token"].get<std::string>()).value();
     const Json mission{{"name", word + " flight"}, {"site", ids["site"]}, {"track_point", "tag_antenna"}};
     ids["mission"] = made(out, "/api/v1/missions", mission);
     ids["plan"] = made(out, "/api/v1/plans", plan(word, ids["site"]));
     ids["building"] = made(out, "/api/v1/buildings", {{"name", word + " hall"}, {"site", ids["site"]}});
-    ids["floor"] =
-        made(out, "/api/v1/floors", {{"name", word + " ground"}, {"level", 0}, {"building", ids["building"]}});
+    ids["floor"] = made(out, "/api/v1/floors",
+                        {{"name", word + " ground"}, {"level", 0}, {"building", ids["building"]}});
     ids["frame"] = made(out, "/api/v1/frames", {{"name", word + "-frame"}, {"site", ids["site"]}});
     out.network_ids = {to_string(NetworkId{anchor}), to_string(NetworkId{anchor + 1})};
     fly(out, ids["mission"], 1);
@@ -127,12 +126,12 @@ class SiteTokens : public AppFixture {
     const auto named = as_match(out, Method::patch, "/api/v1/anchors/" + out.network_ids[0],
                                 Json{{"name", word + " lobby"}}.dump());
     EXPECT_EQ(named.status, 200) << named.body;
-    ids["exclusion"] = json(as(out.who, Method::post, "/api/v1/missions/" + ids["mission"] + "/exclusions",
-                               {Json{{"what", "ranges"}, {"ids", {std::stoll(ids["range"])}}, {"reason", word}}
-                                    .dump()}))
-                           .value("id", "");
-    const auto job = as(out.who, Method::post, "/api/v1/calibrations",
-                        {Json{{"missions", {ids["mission"]}}}.dump()});
+    ids["exclusion"] =
+        json(as(out.who, Method::post, "/api/v1/missions/" + ids["mission"] + "/exclusions",
+                {Json{{"what", "ranges"}, {"ids", {std::stoll(ids["range"])}}, {"reason", word}}.dump()}))
+            .value("id", "");
+    const auto job =
+        as(out.who, Method::post, "/api/v1/calibrations", {Json{{"missions", {ids["mission"]}}}.dump()});
     EXPECT_EQ(job.status, 202) << job.body;
     ids["job"] = json(job).value("id", "");
     return out;
@@ -154,12 +153,14 @@ class SiteTokens : public AppFixture {
     std::string fixes, ranges;
     for (int i = 0; i < 10; ++i) {
       const auto t_us = 1'777'889'472'000'000 + second * 1'000'000 + i * 100'000;
-      fixes += Json{{"t_us", t_us}, {"lon", 3.7131 + i * 1e-6}, {"lat", 51.0231}, {"h_m", 61.4}, {"fix", "fixed"}}
-                   .dump() +
-               '\n';
-      ranges += Json{{"t_us", t_us + 1000}, {"tag", "0x6e01"}, {"anchor", of.network_ids[0]}, {"distance_m", 7.5}}
-                    .dump() +
-                '\n';
+      fixes +=
+          Json{{"t_us", t_us}, {"lon", 3.7131 + i * 1e-6}, {"lat", 51.0231}, {"h_m", 61.4}, {"fix", "fixed"}}
+              .dump() +
+          '\n';
+      ranges +=
+          Json{{"t_us", t_us + 1000}, {"tag", "0x6e01"}, {"anchor", of.network_ids[0]}, {"distance_m", 7.5}}
+              .dump() +
+          '\n';
     }
     for (const auto& [path, body] : {std::pair{"/api/v1/fixes", fixes}, {"/api/v1/ranges", ranges}}) {
       const auto sent =

@@ -60,10 +60,8 @@ TEST_F(SiteTokenStream, AResumedStreamLeavesOutWhatWasOfAnotherSite) {
   auto bravo = app_->ws_factory()(bravo_.who, [] { return true; });
   bravo->on_open([] {});
   for (const char* topic : {"events", "ranges", "fixes", "revisions"})
-    bravo->on_text(Json{{"op", "sub"},
-                        {"id", 1},
-                        {"topic", topic},
-                        {"since", {{"epoch", app_->hub().epoch()}, {"seq", 0}}}}
+    bravo->on_text(Json{
+        {"op", "sub"}, {"id", 1}, {"topic", topic}, {"since", {{"epoch", app_->hub().epoch()}, {"seq", 0}}}}
                        .dump());
   const auto got = frames(*bravo);
   EXPECT_EQ(betrayed(alpha_, got), "") << got;

@@ -124,8 +124,8 @@ TEST_F(SiteTokenRoutes, WhatIsOfItsOwnSiteIsThere) {
   std::size_t seen = 0;
   for (const auto& route : api::route_sites()) {
     const std::string pattern(route.pattern);
-    if (route.method != Method::get || route.rule == SiteRule::refused || pattern.find('{') == std::string::npos ||
-        pattern.starts_with("/ogc") || pattern.starts_with("/prob"))
+    if (route.method != Method::get || route.rule == SiteRule::refused ||
+        pattern.find('{') == std::string::npos || pattern.starts_with("/ogc") || pattern.starts_with("/prob"))
       continue;
     const auto answer = as(alpha_.who, Method::get, with_params(pattern, named(alpha_)));
     if (none_yet.contains(pattern)) continue;
@@ -136,10 +136,13 @@ TEST_F(SiteTokenRoutes, WhatIsOfItsOwnSiteIsThere) {
 }
 
 TEST_F(SiteTokenRoutes, ListsExportsAndDocumentsHoldNothingOfAnotherSite) {
-  const std::map<std::string, std::string> of_theirs{
-      {"mission", alpha_.id("mission")},   {"site", alpha_.id("site")}, {"building", alpha_.id("building")},
-      {"revision", alpha_.id("number")},   {"view", "live"},            {"deleted", "true"},
-      {"cursor", alpha_.id("mission")}};
+  const std::map<std::string, std::string> of_theirs{{"mission", alpha_.id("mission")},
+                                                     {"site", alpha_.id("site")},
+                                                     {"building", alpha_.id("building")},
+                                                     {"revision", alpha_.id("number")},
+                                                     {"view", "live"},
+                                                     {"deleted", "true"},
+                                                     {"cursor", alpha_.id("mission")}};
   for (const auto& route : api::route_sites()) {
     const std::string pattern(route.pattern);
     const bool ogc = pattern.starts_with("/ogc");
@@ -165,12 +168,14 @@ TEST_F(SiteTokenRoutes, ListsExportsAndDocumentsHoldNothingOfAnotherSite) {
         }
         // An answer may say again what it was asked.
         for (const auto& [key, value] : query)
-          while (!value.empty() && body.find(value) != std::string::npos) body.erase(body.find(value), value.size());
+          while (!value.empty() && body.find(value) != std::string::npos)
+            body.erase(body.find(value), value.size());
         EXPECT_EQ(betrayed(alpha_, path.find("/items/") == std::string::npos ? body : ""), "") << path;
       };
       held({});
       for (const auto& [key, value] : of_theirs) held({{key, value}});
-      for (const char* format : {"geojson", "json", "csv", "ndjson", "kml", "gpkg", "dxf", "ifc", "pnezd", "pozyx"})
+      for (const char* format :
+           {"geojson", "json", "csv", "ndjson", "kml", "gpkg", "dxf", "ifc", "pnezd", "pozyx"})
         held({{"format", format}});
       if (path.find("/items/") != std::string::npos) EXPECT_EQ(get_as(bravo_, path).status, 404) << path;
     }
@@ -183,7 +188,8 @@ TEST_F(SiteTokenRoutes, ListsExportsAndDocumentsHoldNothingOfAnotherSite) {
 TEST_F(SiteTokenRoutes, PagesAreFullAndEndWithTheLastOfItsOwn) {
   for (int i = 0; i < 3; ++i) {
     for (const auto* firm : {&alpha_, &bravo_})
-      ASSERT_EQ(post_as(*firm, "/api/v1/missions", {{"name", firm->word}, {"site", firm->id("site")}}).status, 201);
+      ASSERT_EQ(post_as(*firm, "/api/v1/missions", {{"name", firm->word}, {"site", firm->id("site")}}).status,
+                201);
   }
   const auto first = json(get_as(bravo_, "/api/v1/missions", {{"limit", "3"}}));
   EXPECT_EQ(first["items"].size(), 3u);
@@ -233,8 +239,11 @@ TEST_F(SiteTokenRoutes, NothingIsWrittenOfOrIntoAnotherSite) {
     EXPECT_EQ(sent.status, 404) << sent.body;
   }
   const auto row = as(bravo_.who, Method::post, "/api/v1/ranges",
-                      {Json{{"t_us", 1777889472000000}, {"mission", alpha_.id("mission")}, {"tag", "0x6e01"},
-                            {"anchor", "0x1"}, {"distance_m", 7}}
+                      {Json{{"t_us", 1777889472000000},
+                            {"mission", alpha_.id("mission")},
+                            {"tag", "0x6e01"},
+                            {"anchor", "0x1"},
+                            {"distance_m", 7}}
                            .dump()});
   EXPECT_EQ(json(row).value("accepted", 9), 0) << row.body;
   EXPECT_EQ(get_as(bravo_, "/api/v1/calibrations/" + bravo_.id("calibration") + "/diff",
@@ -247,8 +256,8 @@ TEST_F(SiteTokenRoutes, WhatIsMadeWithoutASiteIsOfTheOneThatTheTokenIsBoundTo) {
   Json plan = json(get_as(bravo_, "/api/v1/plans/" + bravo_.id("plan")));
   for (const char* key : {"id", "revision", "created_at", "changed_at", "site"}) plan.erase(key);
   Firm both = bravo_;
-  both.who.sites = SiteSet::only({SiteId{parse_uuid(alpha_.id("site")).value()},
-                                  SiteId{parse_uuid(bravo_.id("site")).value()}});
+  both.who.sites = SiteSet::only(
+      {SiteId{parse_uuid(alpha_.id("site")).value()}, SiteId{parse_uuid(bravo_.id("site")).value()}});
   for (const auto& [path, body] : std::map<std::string, Json>{{"/api/v1/missions", {{"name", "x"}}},
                                                               {"/api/v1/frames", {{"name", "x"}}},
                                                               {"/api/v1/plans", plan}}) {
@@ -261,8 +270,8 @@ TEST_F(SiteTokenRoutes, WhatIsMadeWithoutASiteIsOfTheOneThatTheTokenIsBoundTo) {
 
 TEST_F(SiteTokenRoutes, AnAnchorOfAnotherSiteIsNotPublishedUnderItsNetworkId) {
   int n = 0;
-  const auto calibration = stored_calibration(
-      [&](Estimate& e) { e.anchor = {n++ == 0 ? 0xa1a1u : 0xb2b9u}; }, bravo_.id("mission"));
+  const auto calibration = stored_calibration([&](Estimate& e) { e.anchor = {n++ == 0 ? 0xa1a1u : 0xb2b9u}; },
+                                              bravo_.id("mission"));
   const auto path = "/api/v1/calibrations/" + calibration + "/publish";
   const auto all = as(bravo_.who, Method::post, path, {"{}"});
   EXPECT_EQ(all.status, 409) << all.body;
@@ -289,8 +298,11 @@ TEST_F(SiteTokenRoutes, SaysOfWhichSitesATokenIs) {
   EXPECT_TRUE(json(get("/api/v1/me"))["sites"].is_null());
   const auto tokens = json(get("/api/v1/tokens"))["items"];
   EXPECT_EQ(std::ranges::count_if(tokens, [](const Json& t) { return t["sites"].is_array(); }), 2);
-  for (const Json& sites : {Json::array(), Json("x"), Json::array({"x"}), Json::array({alpha_.id("mission")})})
-    EXPECT_EQ(post("/api/v1/tokens", Json{{"name", "t"}, {"roles", {"viewer"}}, {"sites", sites}}.dump()).status, 422)
+  for (const Json& sites :
+       {Json::array(), Json("x"), Json::array({"x"}), Json::array({alpha_.id("mission")})})
+    EXPECT_EQ(
+        post("/api/v1/tokens", Json{{"name", "t"}, {"roles", {"viewer"}}, {"sites", sites}}.dump()).status,
+        422)
         << sites;
   restart();
   EXPECT_EQ(json(get("/api/v1/tokens"))["items"], tokens);
@@ -299,7 +311,8 @@ TEST_F(SiteTokenRoutes, SaysOfWhichSitesATokenIs) {
 TEST_F(SiteTokenRoutes, ATokenWhoseSiteIsGoneSeesNothing) {
   const auto empty = post("/api/v1/sites", R"({"name":"short-lived"})");
   const std::string site = json(empty)["id"];
-  const auto token = post("/api/v1/tokens", Json{{"name", "t"}, {"roles", {"admin"}}, {"sites", {site}}}.dump());
+  const auto token =
+      post("/api/v1/tokens", Json{{"name", "t"}, {"roles", {"admin"}}, {"sites", {site}}}.dump());
   Call removal;
   removal.headers["if-match"] = header(empty, "ETag");
   ASSERT_EQ(call(Method::del, "/api/v1/sites/" + site, "", removal).status, 204);
