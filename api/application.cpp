@@ -17,7 +17,7 @@ Hub& Application::hub() { return state_->hub; }
 DeviceRows& Application::device_rows() { return state_->device_ingest; }
 
 std::optional<Response> Application::at_hand(const Route& route, const Request& request) const {
-  if (route.pattern != k_anchor_pattern) return std::nullopt;
+  if (route.pattern != k_anchor_pattern || !request.principal.sites.all()) return std::nullopt;
   return state_->anchor_answers.find(request);
 }
 

@@ -23,6 +23,8 @@ namespace anchord::api {
 Application::State::State(Deps d)
     : deps(std::move(d)),
       stores(deps.stores),
+      scoped(stores),
+      seen(scoped.stores()),
       steady(*deps.steady),
       late([this](std::string_view what) { deps.log_fault("", what); }),
       prompt(stores.access, late),
@@ -35,7 +37,7 @@ Application::State::State(Deps d)
       signer(ModelSigner::parse_seed(deps.model_key).value()),
       models(ModelSource(stores.models, signer)),
       missions(
-          {.missions = stores.missions,
+          {.missions = seen.missions,
            .measurements = stores.measurements,
            .sites = stores.sites,
            .anchors = stores.anchors,
@@ -57,7 +59,7 @@ Application::State::State(Deps d)
            .kept_targets = [this](const MissionId& id) { return kept_outcome(stores.plans, id).targets; }}),
       structures(stores.places),
       flights({.missions = missions,
-               .plans = stores.plans,
+               .plans = seen.plans,
                .structures = structures,
                .hub = hub,
                .events = events,
@@ -81,16 +83,16 @@ Application::State::State(Deps d)
       contradictions({stores.anchors, stores.calibrations, stores.revisions, stores.missions, events}),
       profiles(stores.kits, stores.missions, deps.clock),
       calibrations(
-          {.measurements = stores.measurements,
-           .missions = stores.missions,
-           .sites = stores.sites,
-           .calibrations = stores.calibrations,
+          {.measurements = seen.measurements,
+           .missions = seen.missions,
+           .sites = seen.sites,
+           .calibrations = seen.calibrations,
            .jobs = jobs,
            .clock = deps.clock,
            .profiles = profiles,
            .models = models,
            .flight_priors = [this](const MissionId& id) { return kept_outcome(stores.plans, id).priors; },
-           .frames = stores.frames,
+           .frames = seen.frames,
            .exclusions = stores.exclusions,
            .track = deps.track,
            .contradictions = contradictions}),
@@ -122,29 +124,20 @@ Application::State::State(Deps d)
                          deps.metrics_text();
                 },
                 deps.support_files},
-      device_api{deps.devices, stores.measurements, stream, jobs, audit},
-      mission_api{
-          missions,     stores.missions, stores.measurements,  stores.sites, stores.bin, stream, events,
-          housekeeping, running,         deps.keep_deleted_ns, deps.clock,   audit,      flights},
-      measurement_api{stores.measurements, ingest, missions,     models, stores.exclusions, events,
-                      deps.clock,          audit,  demonstration},
+      device_api{deps.devices, seen.measurements, stream, jobs, audit},
+      mission_api{missions,     seen.missions, seen.measurements,    seen.sites, seen.bin, stream, events,
+                  housekeeping, running,       deps.keep_deleted_ns, deps.clock, audit,    flights},
+      measurement_api{seen.measurements, ingest, missions,     models, stores.exclusions, events,
+                      deps.clock,        audit,  demonstration},
       anchor_answers(stores.revisions, contradictions),
-      anchor_api{stores.sites,
-                 stores.anchors,
-                 stores.calibrations,
-                 stores.revisions,
-                 stores.frames,
-                 missions,
-                 geo,
-                 contradictions,
-                 deps.clock,
-                 audit},
+      anchor_api{seen.sites, seen.anchors, seen.calibrations, seen.revisions, seen.frames,
+                 missions,   geo,          contradictions,    deps.clock,     audit},
       calibration_api{calibrations,
-                      stores.calibrations,
-                      stores.revisions,
-                      stores.sites,
-                      stores.anchors,
-                      stores.missions,
+                      seen.calibrations,
+                      seen.revisions,
+                      seen.sites,
+                      seen.anchors,
+                      seen.missions,
                       missions,
                       contradictions,
                       profiles,
@@ -154,8 +147,8 @@ Application::State::State(Deps d)
                       deps.clock,
                       audit,
                       "anchord " + deps.build.version},
-      planning_api{stores.plans,
-                   stores.sites,
+      planning_api{seen.plans,
+                   seen.sites,
                    deps.clock,
                    audit,
                    [this](const PlanId& id) { return flights.flown_with(id); },
@@ -168,11 +161,11 @@ Application::State::State(Deps d)
                    return published_features(anchor_api, std::nullopt, newest);
                  },
                  steady, deps.mqtt_prefix, deps.build.version}),
-      exchange_api{anchor_api, stores.missions, stores.measurements, stores.places, deps.geopackage},
+      exchange_api{anchor_api, seen.missions, seen.measurements, seen.places, deps.geopackage},
       webhook_api{stores.webhooks, webhooks, deps.web_post, deps.clock, audit},
-      omlox_api{anchor_api, stores.places, omlox_locations, deps.clock},
-      place_api{stores.places, stores.sites, jobs,  deps.run_plan_work,
-                deps.clock,    steady,       audit, [this] { structures.changed(); }},
+      omlox_api{anchor_api, seen.places, omlox_locations, deps.clock},
+      place_api{seen.places, seen.sites, jobs,  deps.run_plan_work,
+                deps.clock,  steady,     audit, [this] { structures.changed(); }},
       bundle_api{
           .bundles = stores.bundles,
           .clock = deps.clock,
@@ -184,19 +177,19 @@ Application::State::State(Deps d)
                           const Principal& who) { return bundle_notes(events, stores.access, mission, who); },
           .taken = [this](const MissionId& id, const std::string& text,
                           bool published) { announce_bundle(calibration_api, id, text, published); },
-          .calibrations = stores.calibrations,
-          .revisions = stores.revisions,
+          .calibrations = seen.calibrations,
+          .revisions = seen.revisions,
           .key = signer.key(),
           .ask = [this](Request& request) { return router.handle(request); },
-          .measurements = stores.measurements,
+          .measurements = seen.measurements,
           .feature_file = deps.feature_file},
       learning_stores{stores.campaigns, stores.labels, stores.datasets, stores.training_runs, stores.models},
       learning_api{
           learning_stores,
           training,
           models,
-          stores.measurements,
-          stores.missions,
+          seen.measurements,
+          seen.missions,
           stores.exclusions,
           jobs,
           stores.jobs,
@@ -232,6 +225,8 @@ std::unique_ptr<WorkDesk> Application::State::make_desk() {
 
 void Application::State::add_routes() {
   router.on_fault(deps.log_fault);
+  router.run_bound_by(
+      [this](const Route& route, const Request& request) { return run_bound(route, request); });
   add_mission_routes(router, mission_api);
   add_mission_bin_routes(router, mission_api);
   add_measurement_routes(router, measurement_api);
@@ -252,7 +247,7 @@ void Application::State::add_routes() {
   add_dataset_routes(router, learning_api);
   add_training_run_routes(router, learning_api);
   add_model_routes(router, learning_api);
-  add_access_routes(router, deps.access);
+  add_access_routes(router, deps.access, stores.sites);
   add_alarm_routes(router, admin_api);
   add_backup_routes(router, admin_api);
   add_system_routes(router, admin_api);

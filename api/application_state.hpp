@@ -46,6 +46,8 @@
 #include "api/places/routes.hpp"
 #include "api/planning/routes.hpp"
 #include "api/planning/site_structures.hpp"
+#include "api/scope/route_sites.hpp"
+#include "api/scope/scoped_stores.hpp"
 #include "api/stream/hub.hpp"
 #include "api/webhooks/routes.hpp"
 #include "api/webhooks/webhook_service.hpp"
@@ -59,6 +61,9 @@ namespace anchord::api {
 struct Application::State {
   explicit State(Deps d);
   void add_routes();
+  /// Answers for who is bound to sites.
+  Response run_bound(const Route& route, const Request& request);
+  void check_named(SiteRule rule, const Request& request);
   std::unique_ptr<WorkDesk> make_desk();
 
   ServerCounts counts() const;
@@ -78,6 +83,8 @@ struct Application::State {
 
   Deps deps;
   const Stores& stores;
+  ScopedStores scoped;
+  const Stores& seen;  ///< what requests read and write, and jobs: rows of the sites of who asks
   const SteadyClock& steady;
   LateWriter late;
   PromptAccessStore prompt;

@@ -41,6 +41,7 @@ set(rows
   "drivers/sim: core/base core/types drivers/pozyx drivers/mavlink drivers/drone"
 
   "api/kit: core/base core/ports"
+  "api/scope: core/base core/types core/ports api/kit"
   "api/stream: core/base api/kit"
   "api/wire: core/base core/types core/geo core/localize core/flight api/kit"
   "api/formats: core/base core/types core/geo core/nlos core/ml core/planning core/localize api/kit api/wire"
@@ -59,7 +60,7 @@ set(rows
   "api/omlox: core/base core/types core/ports core/geo api/kit api/stream api/anchors api/webhooks"
   "api/places: core/base core/types core/ports core/geo core/floor_plan api/kit api/admin api/learning"
   "api/bundles: core/base core/types core/ports api/kit api/formats api/admin"
-  "api: core/base core/types core/ports core/geo core/localize api/kit api/stream api/wire api/admin api/devices api/learning api/missions api/measurements api/anchors api/planning api/flight api/calibration api/exchange api/webhooks api/mqtt api/omlox api/places api/bundles"
+  "api: core/base core/types core/ports core/geo core/localize api/kit api/scope api/stream api/wire api/admin api/devices api/learning api/missions api/measurements api/anchors api/planning api/flight api/calibration api/exchange api/webhooks api/mqtt api/omlox api/places api/bundles"
 
   "migrations:"
   "server/storage: core/base core/types core/ports migrations"

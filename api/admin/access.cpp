@@ -38,6 +38,7 @@ Principal principal_of(const Token& token) {
   for (const auto& word : token.roles) {
     if (const auto role = k_role_words.find(word)) who.roles.push_back(*role);
   }
+  who.sites = token.sites;
   return who;
 }
 
@@ -167,7 +168,7 @@ bool AccessService::has_tokens() const {
 
 Result<NewToken> AccessService::create_token(std::string_view name, const std::vector<std::string>& roles,
                                              std::optional<UtcTime> expires, const Principal& by,
-                                             std::string_view from) {
+                                             std::string_view from, const SiteSet& sites) {
   if (name.empty() || name.size() > 100)
     return make_error(Errc::invalid_argument, "the name must have 1 to 100 characters");
   if (roles.empty()) return make_error(Errc::invalid_argument, "a token needs at least one role");
@@ -184,6 +185,7 @@ Result<NewToken> AccessService::create_token(std::string_view name, const std::v
   made.token.roles = roles;
   made.token.created = now;
   made.token.expires = expires;
+  made.token.sites = sites;
   const std::string key = without_dashes(made.token.id.uuid);
   made.text = std::string(k_prefix) + key + "_" + secret;
   BOOST_OUTCOME_TRYV(state_->store.insert(made.token));

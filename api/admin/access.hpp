@@ -57,9 +57,11 @@ class AccessService {
   bool has_tokens() const;
   const AccessOptions& options() const;
 
-  /// Roles must be known words ("viewer", ... "admin"). Errors: invalid_argument, those of the store.
+  /// Roles must be known words ("viewer", ... "admin"). `sites` are not asked for here: whoever knows them
+  /// does. Errors: invalid_argument, those of the store.
   Result<NewToken> create_token(std::string_view name, const std::vector<std::string>& roles,
-                                std::optional<UtcTime> expires, const Principal& by, std::string_view from);
+                                std::optional<UtcTime> expires, const Principal& by, std::string_view from,
+                                const SiteSet& sites = {});
   Result<void> revoke_token(const TokenId& id, const Principal& by, std::string_view from);
   std::vector<Token> tokens() const;
 

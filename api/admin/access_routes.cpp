@@ -7,11 +7,14 @@
 #include "api/kit/router.hpp"
 #include "api/kit/support.hpp"
 #include "core/base/to_wire.hpp"
+#include "core/ports/site_store.hpp"
 
 namespace anchord::api {
 namespace {
 
 using nlohmann::json;
+
+constexpr std::size_t k_max_sites = 100;  ///< of a token
 
 /// The body as an object with no other keys than these; every fault at once.
 json body_of(const Request& request, std::initializer_list<std::string_view> known) {
@@ -40,10 +43,19 @@ std::string text_field(const json& body, const char* key, std::vector<FieldError
   return at->get<std::string>();
 }
 
+/// null: every site.
+json sites_json(const SiteSet& sites) {
+  if (sites.all()) return nullptr;
+  json out = json::array();
+  for (const auto& id : sites.sites()) out.push_back(to_string(id));
+  return out;
+}
+
 json token_json(const Token& token) {
   json out{{"id", to_string(token.id)},
            {"name", token.name},
            {"roles", token.roles},
+           {"sites", sites_json(token.sites)},
            {"created_at", to_rfc3339(token.created)}};
   const auto time = [](const std::optional<UtcTime>& t) { return t ? json(to_rfc3339(*t)) : json(nullptr); };
   out["expires_at"] = time(token.expires);
@@ -59,6 +71,7 @@ json principal_json(const Principal& who) {
   return {{"token_id", who.token_id},
           {"name", who.name},
           {"roles", roles},
+          {"sites", sites_json(who.sites)},
           {"auth", login_is_off ? "off" : "on"}};
 }
 
@@ -85,8 +98,32 @@ std::string_view cookie_of(const Request& request) {
   return cookie_value(request.header("cookie"), k_session_cookie);
 }
 
-Response create_token(AccessService& access, const Request& request) {
-  const json body = body_of(request, {"name", "roles", "expires_at"});
+/// Absent or null: every site.
+SiteSet read_sites(const json& body, SiteStore& known, std::vector<FieldError>& faults) {
+  const auto list = body.find("sites");
+  if (list == body.end() || list->is_null()) return {};
+  if (!list->is_array() || list->empty() || list->size() > k_max_sites) {
+    faults.push_back(
+        {"/sites", "wrong_type", "null, or a list of 1 to " + std::to_string(k_max_sites) + " ids of sites"});
+    return {};
+  }
+  std::vector<SiteId> sites;
+  for (std::size_t i = 0; i < list->size(); ++i) {
+    const auto& item = (*list)[i];
+    const std::string at = "/sites/" + std::to_string(i);
+    const auto id = parse_uuid(item.is_string() ? item.get_ref<const std::string&>() : "");
+    if (!id)
+      faults.push_back({at, "bad_id", id.error().message});
+    else if (!known.site(SiteId{id.value()}))
+      faults.push_back({at, "unknown_site", "there is no such site"});
+    else
+      sites.push_back(SiteId{id.value()});
+  }
+  return SiteSet::only(std::move(sites));
+}
+
+Response create_token(AccessService& access, SiteStore& known, const Request& request) {
+  const json body = body_of(request, {"name", "roles", "expires_at", "sites"});
   std::vector<FieldError> faults;
   const std::string name = text_field(body, "name", faults);
   std::vector<std::string> roles;
@@ -113,10 +150,11 @@ Response create_token(AccessService& access, const Request& request) {
       faults.push_back({"/expires_at", "format", "a UTC time like 2027-01-31T00:00:00Z"});
     }
   }
+  const SiteSet sites = read_sites(body, known, faults);
   if (!faults.empty())
     throw_problem(422, "validation", std::to_string(faults.size()) + " fields are wrong", faults);
   const auto made =
-      value_or_problem(access.create_token(name, roles, expires, request.principal, request.remote));
+      value_or_problem(access.create_token(name, roles, expires, request.principal, request.remote, sites));
   json out = token_json(made.token);
   out["token"] = made.text;  // the only time it is shown
   auto response = answer(201, out);
@@ -169,12 +207,12 @@ Response logout(AccessService& access, const Request& request) {
 
 }  // namespace
 
-void add_access_routes(Router& router, AccessService& access) {
+void add_access_routes(Router& router, AccessService& access, SiteStore& sites) {
   using enum Method;
   const auto admin = Access::any_of({Role::admin});
   router.add({get, "/api/v1/tokens", admin, [&access](const Request& r) { return list_tokens(access, r); }});
-  router.add(keeps_nothing(
-      {post, "/api/v1/tokens", admin, [&access](const Request& r) { return create_token(access, r); }}));
+  router.add(keeps_nothing({post, "/api/v1/tokens", admin,
+                            [&access, &sites](const Request& r) { return create_token(access, sites, r); }}));
   router.add(
       {del, "/api/v1/tokens/{id}", admin, [&access](const Request& r) { return revoke_token(access, r); }});
   router.add(keeps_nothing({post, "/api/v1/session", Access::open(),

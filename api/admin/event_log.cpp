@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "api/kit/current_sites.hpp"
 #include "api/stream/hub.hpp"
 #include "api/wire/live_writer.hpp"
 #include "core/base/text.hpp"
@@ -24,7 +25,7 @@ void EventLog::add(EventLevel level, std::string code, std::string text, std::op
     kept->push_back(event);
     if (kept->size() > k_kept) kept->pop_front();
   }
-  hub_.publish(Topic::events, std::move(json), now.us());
+  hub_.publish(Topic::events, std::move(json), now.us(), {}, {}, mission);
   tell_(event);
 }
 
@@ -37,12 +38,22 @@ void EventLog::restore(const std::vector<LiveEvent>& events) {
 
 std::vector<LiveEvent> EventLog::newest(std::size_t limit, const std::optional<MissionId>& mission,
                                         std::optional<UtcTime> since) const {
+  const SiteSet& sites = current_sites();
+  // Of which site a mission is, the hub knows; it is not asked under the lock.
+  const std::size_t most = sites.all() ? limit : k_kept;
   std::vector<LiveEvent> out;
-  const auto kept = events_.lock();
-  for (auto it = kept->rbegin(); it != kept->rend() && out.size() < limit; ++it) {
-    if (mission && it->mission != mission) continue;
-    if (since && it->time < *since) continue;  // not in order of time where the clock was set back
-    out.push_back(*it);
+  {
+    const auto kept = events_.lock();
+    for (auto it = kept->rbegin(); it != kept->rend() && out.size() < most; ++it) {
+      if (mission && it->mission != mission) continue;
+      if (since && it->time < *since) continue;  // not in order of time where the clock was set back
+      if (!sites.all() && !it->mission) continue;
+      out.push_back(*it);
+    }
+  }
+  if (!sites.all()) {
+    std::erase_if(out, [&](const LiveEvent& event) { return !sites.holds(hub_.site_of(*event.mission)); });
+    if (out.size() > limit) out.resize(limit);
   }
   return out;
 }

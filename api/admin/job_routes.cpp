@@ -7,6 +7,7 @@
 #include "api/kit/id_page.hpp"
 #include "api/kit/reader.hpp"
 #include "api/kit/router.hpp"
+#include "api/kit/seen_page.hpp"
 #include "api/kit/support.hpp"
 #include "core/ports/job_store.hpp"
 
@@ -40,7 +41,12 @@ Response list(AdminApi& s, const Request& request) {
   check_query(request, {"limit", "cursor", "fields"});
   return id_page<JobId>(
       request,
-      [&](std::size_t limit, const std::optional<JobId>& after) { return s.job_store.jobs(limit, after); },
+      [&](std::size_t limit, const std::optional<JobId>& after) {
+        return seen_page<Job>(
+            limit, after, [&](auto n, const auto& from) { return s.job_store.jobs(n, from); },
+            [&](const Job& job) -> Result<bool> { return s.jobs.seen(job.id); },
+            [](const Job& job) { return job.id; });
+      },
       [&](const auto& job) { return job_json(job); });
 }
 

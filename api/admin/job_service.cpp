@@ -1,5 +1,6 @@
 #include "api/admin/job_service.hpp"
 
+#include <algorithm>
 #include <condition_variable>
 #include <deque>
 #include <map>
@@ -7,6 +8,7 @@
 #include <set>
 
 #include "api/admin/job_json.hpp"
+#include "api/kit/current_sites.hpp"
 #include "api/kit/memory.hpp"
 #include "api/kit/problem.hpp"
 #include "api/stream/hub.hpp"
@@ -17,6 +19,8 @@
 
 namespace anchord::api {
 namespace {
+
+constexpr std::size_t k_max_for_sites = 1000;
 
 bool ended(JobState state) { return state != JobState::queued && state != JobState::running; }
 
@@ -60,6 +64,7 @@ struct JobService::State {
   struct Lanes {
     std::map<std::string, Lane> of_kind{};
     std::set<JobId> canceled{};
+    std::map<JobId, SiteSet> for_sites{};  ///< of those that were submitted for some sites alone
     bool started{false}, stopping{false};
     int posted{0};             ///< turns that the executor has not finished
     std::uint64_t changes{0};  ///< of states of jobs
@@ -192,8 +197,26 @@ Result<Job> JobService::submit(std::string kind, std::string request_json, Work 
   const Job job = new_job(state_->clock.now(), std::move(kind), std::move(request_json), id);
   BOOST_OUTCOME_TRYV(state_->admit(job.kind));
   BOOST_OUTCOME_TRYV(state_->jobs.insert(job));
+  if (!current_sites().all()) {
+    work = [sites = current_sites(), work = std::move(work)](JobContext& context) {
+      const ForSites theirs(sites);
+      return work(context);
+    };
+    auto now = state_->lanes.lock();
+    if (now->for_sites.size() >= k_max_for_sites) now->for_sites.erase(now->for_sites.begin());  // the oldest
+    now->for_sites.emplace(job.id, current_sites());
+  }
   state_->enqueue(state_, job, std::move(work));
   return job;
+}
+
+bool JobService::seen(const JobId& id) const {
+  const SiteSet& sites = current_sites();
+  if (sites.all()) return true;
+  const auto now = state_->lanes.lock();
+  const auto at = now->for_sites.find(id);
+  return at != now->for_sites.end() &&
+         std::ranges::all_of(at->second.sites(), [&](const SiteId& site) { return sites.holds(site); });
 }
 
 Result<Job> JobService::restart(const JobId& id, Work work) {

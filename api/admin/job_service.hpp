@@ -51,7 +51,8 @@ class JobService {
   /// Asks what runs to end, and waits for it; what waits is marked interrupted by the next start.
   void stop();
 
-  /// A job of a new id, or of the one given. queue_full when too many of its kind wait.
+  /// A job of a new id, or of the one given; it works for whom the caller works for (current_sites()).
+  /// queue_full when too many of its kind wait.
   Result<Job> submit(std::string kind, std::string request_json, Work work, std::optional<JobId> id = {});
   /// The same job again under its own id, from the beginning. conflict while it waits, runs or has succeeded.
   Result<Job> restart(const JobId& id, Work work);
@@ -68,6 +69,10 @@ class JobService {
 
   /// conflict when it has ended.
   Result<Job> cancel(const JobId& id);
+
+  /// Whether whom the caller works for may see the job: who is bound to sites, what was submitted for them
+  /// alone since the start.
+  bool seen(const JobId& id) const;
 
  private:
   struct State;

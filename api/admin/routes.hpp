@@ -17,6 +17,7 @@ class AccessStore;
 class Backups;
 class Clock;
 class JobStore;
+class SiteStore;
 struct Job;
 }  // namespace anchord
 
@@ -60,7 +61,7 @@ struct AdminApi {
 Result<Job> begin_backup(const AdminApi& admin);
 
 /// /api/v1/tokens, /session, /me, /ws-tickets.
-void add_access_routes(Router& router, AccessService& access);
+void add_access_routes(Router& router, AccessService& access, SiteStore& sites);
 void add_alarm_routes(Router& router, AdminApi& admin);
 void add_backup_routes(Router& router, AdminApi& admin);
 void add_job_routes(Router& router, AdminApi& admin);

@@ -10,6 +10,7 @@
 #include "api/anchors/routes.hpp"
 #include "api/anchors/site_json.hpp"
 #include "api/kit/content_tag.hpp"
+#include "api/kit/current_sites.hpp"
 #include "api/kit/reader.hpp"
 #include "api/kit/support.hpp"
 #include "api/missions/mission_service.hpp"
@@ -116,11 +117,13 @@ Response answer(const AnchorFeature& feature) {
 /// To a GET. Who names the ETag has the body already, which is not even made then; the router answers 304.
 Response one(AnchorApi& s, const Request& request) {
   check_query(request, {});
-  if (s.answers != nullptr) {
-    if (auto kept = s.answers->find(request)) return *std::move(kept);
+  // Kept are the answers of those who see all sites: others may see no such anchor, or less of it.
+  AnchorAnswers* const answers = current_sites().all() ? s.answers : nullptr;
+  if (answers != nullptr) {
+    if (auto kept = answers->find(request)) return *std::move(kept);
   }
   (void)s.contradictions.standing();  // settled, or there is no state that the answer could be kept under
-  const auto before = s.answers != nullptr ? s.answers->state() : std::nullopt;
+  const auto before = answers != nullptr ? answers->state() : std::nullopt;
   const AnchorFeature feature = feature_of(s, path_anchor(s, request));
   const std::string tag = etag(feature);
   if (etag_listed(request.header("if-none-match"), tag)) {
@@ -130,7 +133,7 @@ Response one(AnchorApi& s, const Request& request) {
     return response;
   }
   Response response = answer(feature);
-  if (s.answers != nullptr) s.answers->keep(request.params.at("id"), before, {response.body, tag});
+  if (answers != nullptr) answers->keep(request.params.at("id"), before, {response.body, tag});
   return response;
 }
 

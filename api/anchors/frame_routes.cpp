@@ -5,6 +5,7 @@
 #include "api/anchors/frame_json.hpp"
 #include "api/anchors/geo_service.hpp"
 #include "api/anchors/routes.hpp"
+#include "api/kit/current_sites.hpp"
 #include "api/kit/id_page.hpp"
 #include "api/kit/reader.hpp"
 #include "api/kit/support.hpp"
@@ -63,6 +64,7 @@ Response list(AnchorApi& s, const Request& request) {
 Response create(AnchorApi& s, const Request& request) {
   LocalFrame frame;
   read_fields(json_body(request), true, frame);
+  frame.site = named_or_own(frame.site);
   frame.created = s.clock.now();
   frame.id.uuid = make_uuid_v7(frame.created);
   value_or_problem(s.frames.insert(frame));

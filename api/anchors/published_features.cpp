@@ -8,6 +8,7 @@
 #include "api/anchors/frame_json.hpp"
 #include "api/anchors/geo_service.hpp"
 #include "api/anchors/routes.hpp"
+#include "api/kit/current_sites.hpp"
 #include "api/kit/reader.hpp"
 #include "api/kit/support.hpp"
 #include "api/wire/budget_json.hpp"
@@ -139,9 +140,11 @@ Anchor anchor_as_stored(AnchorApi& s, NetworkId id) {
 
 namespace {
 
-/// A later flight found it elsewhere: no reader may take it for accepted.
-void contradict(AnchorFeature& feature, const ContradictedAnchor& against) {
+/// A later flight found it elsewhere: no reader may take it for accepted. A flight that the reader does not
+/// see is not there to contradict.
+void contradict(AnchorApi& s, AnchorFeature& feature, const ContradictedAnchor& against) {
   if (feature.anchor.retired) return;
+  if (!current_sites().all() && !s.calibrations.calibration(against.calibration)) return;
   feature.status = "contradicted";
   feature.contradicted = {against.calibration, to_wire(contradiction_json(against)), against.text};
   feature.estimate->gates.push_back(
@@ -168,7 +171,7 @@ std::vector<AnchorFeature> published_features(AnchorApi& s, std::optional<std::u
     out.push_back(lookup.feature(std::move(anchor), position, number));
     const auto against = contradicted->find(position.estimate.anchor);
     // What an older revision said is history; only the newest is what readers build on.
-    if (newest && against != contradicted->end()) contradict(out.back(), against->second);
+    if (newest && against != contradicted->end()) contradict(s, out.back(), against->second);
   }
   std::sort(out.begin(), out.end(),
             [](const auto& a, const auto& b) { return a.anchor.network_id < b.anchor.network_id; });
@@ -183,7 +186,7 @@ std::optional<AnchorFeature> published_feature(AnchorApi& s, const Anchor& ancho
   auto out = lookup.feature(anchor, *position, number);
   const auto contradicted = s.contradictions.standing();
   if (const auto against = contradicted->find(anchor.network_id); against != contradicted->end())
-    contradict(out, against->second);
+    contradict(s, out, against->second);
   return out;
 }
 

@@ -13,6 +13,7 @@
 #include "api/calibration/routes.hpp"
 #include "api/formats/evidence.hpp"
 #include "api/formats/starnet.hpp"
+#include "api/kit/current_sites.hpp"
 #include "api/kit/html_page.hpp"
 #include "api/kit/id_page.hpp"
 #include "api/kit/reader.hpp"
@@ -22,6 +23,7 @@
 #include "core/ports/anchor_store.hpp"
 #include "core/ports/calibration_store.hpp"
 #include "core/ports/job_store.hpp"
+#include "core/ports/mission_store.hpp"
 #include "core/ports/revision_store.hpp"
 
 namespace anchord::api {
@@ -238,6 +240,38 @@ std::vector<NetworkId> chosen(const Calibration& calibration, const PublishReque
   return out;
 }
 
+/// Of who is bound to sites: an anchor that was never published and has no site comes into the site of the
+/// calibration; one of another site is not theirs to publish.
+void claim_anchors(CalibrationApi& s, const Request& request, const Calibration& calibration,
+                   const std::vector<NetworkId>& anchors) {
+  const SiteSet sites = current_sites();
+  if (sites.all()) return;
+  const auto site = value_or_problem(s.mission_store.mission(calibration.missions.front())).site;
+  // As they are for all: what is not seen is told from what nobody has.
+  const ForSites all{SiteSet{}};
+  std::vector<Anchor> free;
+  std::vector<FieldError> errors;
+  for (const auto& id : anchors) {
+    auto anchor = value_or_problem(s.anchors.find_or_create(id, s.clock.now()));
+    if (sites.holds(anchor.site)) continue;
+    if (!anchor.site && value_or_problem(s.revisions.history(id)).empty())
+      free.push_back(std::move(anchor));
+    else
+      errors.push_back({"/anchors", "not_yours",
+                        to_string(id) + " is no anchor of the sites that this token is bound to"});
+  }
+  if (!errors.empty())
+    throw_problem(409, "conflict",
+                  std::to_string(errors.size()) +
+                      " anchors are not of the sites of this token: publish the others by their network ids",
+                  errors);
+  for (auto& anchor : free) {
+    anchor.site = site;
+    value_or_problem(s.anchors.update(anchor, anchor.version));
+    s.audit(request, "anchor.change " + to_string(anchor.network_id) + " site: " + to_string(*site));
+  }
+}
+
 Response publish(CalibrationApi& s, const Request& request) {
   auto calibration = value_or_problem(s.calibration_store.calibration(path_id<CalibrationId>(request)));
   const auto wanted = read_publish(json_body(request, true));
@@ -247,6 +281,7 @@ Response publish(CalibrationApi& s, const Request& request) {
   ask_whether_moved(s, calibration);
   std::vector<Override> overrides;
   const auto anchors = chosen(calibration, wanted, overrides, request.principal.token_id);
+  claim_anchors(s, request, calibration, anchors);
   // Audited before it happens: a publication that nobody can be asked about must not exist.
   s.audit(request, "calibration.publish " + to_string(calibration.id));
   for (const auto& one : overrides) {

@@ -6,6 +6,7 @@
 #include "api/devices/device_stream.hpp"
 #include "api/devices/routes.hpp"
 #include "api/kit/content_tag.hpp"
+#include "api/kit/current_sites.hpp"
 #include "api/kit/reader.hpp"
 #include "api/kit/support.hpp"
 #include "core/base/to_wire.hpp"
@@ -44,7 +45,7 @@ Response list(DeviceApi& s, const Request& request) {
   check_query(request, {"mission", "fields"});
   const auto mission = query_mission(request);
   Ordered items = Ordered::array();
-  if (!mission) {
+  if (!mission && current_sites().all()) {  // what is set up here is of no site
     for (const auto& device : s.devices.devices()) items.push_back(device_json(device));
   }
   for (const auto& radio : value_or_problem(s.measurements.devices(mission))) {

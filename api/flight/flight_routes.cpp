@@ -5,8 +5,10 @@
 #include "api/flight/flight_service.hpp"
 #include "api/flight/procedure_json.hpp"
 #include "api/flight/routes.hpp"
+#include "api/kit/current_sites.hpp"
 #include "api/kit/reader.hpp"
 #include "api/kit/support.hpp"
+#include "api/missions/mission_service.hpp"
 #include "core/ports/plan_store.hpp"
 
 namespace anchord::api {
@@ -37,6 +39,11 @@ T granted(Result<T> result) {
   return value_or_problem(std::move(result));
 }
 
+/// Of who is bound to sites: whether the lease is of a mission that they do not see.
+bool elsewhere(FlightApi& s, const std::optional<Lease>& lease) {
+  return lease && !current_sites().all() && !s.missions.missions.mission(lease->mission);
+}
+
 /// Asking changes nothing: the holder's screen shows the event, and gives control back or refuses.
 Response ask_for_control(FlightApi& s, const Request& request, const MissionId& mission) {
   const auto lease = s.flights.control();
@@ -58,6 +65,7 @@ Response control(FlightApi& s, const Request& request) {
   const bool by_force = fields.boolean("force").value_or(false);
   fields.finish();
   refuse_if_any(errors);
+  refuse_elsewhere(s, action == ControlAction::take);
   const auto done =
       std::string("control.") + std::string(k_control_words.word(*action)) + ' ' + to_string(mission);
   if (action == ControlAction::take) {
@@ -88,7 +96,8 @@ Response who_has_control(FlightApi& s, const Request& request) {
   check_query(request, {});
   named_mission(s.missions, request);
   const auto lease = s.flights.control();
-  return json_response(200, lease ? lease_json(*lease, false) : Ordered{{"held", false}});
+  return json_response(200,
+                       lease && !elsewhere(s, lease) ? lease_json(*lease, false) : Ordered{{"held", false}});
 }
 
 /// The plan that the body of a command names; nothing where it names none, which is an error of its fields.
@@ -178,6 +187,7 @@ Response act_in_flight(FlightApi& s, const Request& request, const std::string& 
   }
   fields.finish();
   refuse_if_any(errors);
+  refuse_elsewhere(s);
   const std::string what = "mission." + word + ' ' + to_string(mission);
   auto command = s.flights.act(mission, order, request.principal);
   if (!command) {
@@ -202,6 +212,7 @@ Response upload(FlightApi& s, const Request& request) {
   const auto plan = plan_of(fields);
   fields.finish();
   refuse_if_any(errors);
+  refuse_elsewhere(s);
   const std::string& list = *what;
   const std::string audited = "mission.upload " + list + ' ' + to_string(mission);
   auto command = s.flights.upload(mission, list, *plan, lease, request.principal);
@@ -234,6 +245,7 @@ Response change_aircraft(FlightApi& s, const Request& request) {
   const auto sender = fields.text("sender", 100).value_or("");
   fields.finish();
   refuse_if_any(errors);
+  refuse_elsewhere(s);
   const std::string audited = "mission.aircraft " + to_string(mission) + (sender.empty() ? "" : " " + sender);
   auto changed = s.flights.change_aircraft(mission, lease, sender, request.principal);
   if (!changed) {
@@ -246,6 +258,13 @@ Response change_aircraft(FlightApi& s, const Request& request) {
 }
 
 }  // namespace
+
+void refuse_elsewhere(FlightApi& s, bool taking) {
+  const auto lease = s.flights.control();
+  if (elsewhere(s, lease) && !(taking && !s.flights.flies(lease->mission)))
+    throw_problem(409, "no-control",
+                  "the aircraft is commanded for another site: ask whoever runs this server");
+}
 
 FlightActions flight_actions(FlightApi& s) {
   const auto words = flight::k_flight_action_words.words();

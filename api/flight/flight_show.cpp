@@ -114,13 +114,15 @@ FlightService::State::Due FlightService::State::due(Work& w, const flight::Now& 
 }
 
 void FlightService::State::publish(const ProcedureView& view) const {
-  deps.hub.publish(Topic::procedure, to_wire(procedure_json(view)), view.t_us, to_string(view.mission));
+  deps.hub.publish(Topic::procedure, to_wire(procedure_json(view)), view.t_us, to_string(view.mission), {},
+                   view.mission);
 }
 
 void FlightService::State::show_grid(Guard& w) const {
   const auto grid = grid_of(*w->operations.flight(), now().utc.us());
   w.unlocked([&] {
-    deps.hub.publish(Topic::mission_grid, to_wire(grid_json(grid)), grid.t_us, to_string(grid.mission));
+    deps.hub.publish(Topic::mission_grid, to_wire(grid_json(grid)), grid.t_us, to_string(grid.mission), {},
+                     grid.mission);
   });
 }
 
@@ -129,7 +131,7 @@ void FlightService::State::show_profiles(Guard& w) const {
   const auto key = to_string(profiles.mission);
   const auto to = [&](Topic topic) {
     return [&, topic](NetworkId anchor, const nlohmann::ordered_json& one) {
-      deps.hub.publish(topic, to_wire(one), profiles.t_us, key + to_string(anchor), anchor);
+      deps.hub.publish(topic, to_wire(one), profiles.t_us, key + to_string(anchor), anchor, profiles.mission);
     };
   };
   w.unlocked([&] {

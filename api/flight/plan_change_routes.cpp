@@ -48,6 +48,7 @@ Response take(FlightApi& s, const Request& request) {
     order.next_waypoint = static_cast<std::size_t>(*next);
   fields.finish();
   refuse_if_any(errors);
+  refuse_elsewhere(s);
   const std::string audited = "mission.plan " + to_string(mission) + (order.undo ? " undo to" : "") +
                               " revision " + std::to_string(*order.revision);
   auto taken = s.flights.take_plan(mission, order, request.principal);

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "core/base/enum_table.hpp"
+#include "core/base/site_set.hpp"
 
 namespace anchord::api {
 
@@ -41,6 +42,7 @@ struct Principal {
   std::string token_id;  ///< for the audit log; "local" with --auth=off
   std::string name;
   std::vector<Role> roles;
+  SiteSet sites{};  ///< what the token is bound to
   bool has(Role role) const {
     for (const Role r : roles) {
       if (r == role) return true;

@@ -123,6 +123,7 @@ struct Router::State {
   std::vector<std::vector<Pattern>> patterns;  ///< by the number of their parts
   std::unique_ptr<Idempotency> idempotency, of_commands;
   std::function<void(std::string_view, std::string_view)> fault;
+  BoundRun run_bound;
   std::vector<std::pair<std::string, std::function<void(Response&)>>> shapes;  ///< of refusals, by prefix
 };
 
@@ -158,6 +159,7 @@ void Router::shape_refusal(const Request& request, Response& response) const {
     if (request.path.starts_with(prefix)) return shape(response);
   }
 }
+void Router::run_bound_by(BoundRun run) { state_->run_bound = std::move(run); }
 void Router::on_fault(std::function<void(std::string_view, std::string_view)> log) {
   state_->fault = std::move(log);
 }
@@ -218,7 +220,10 @@ Response Router::dispatch(const Route& route, Request& request) const {
   Response response;
   const auto handled = [&](Request& r) {
     try {
-      return route.handler(r);
+      if (r.principal.sites.all()) return route.handler(r);
+      if (!state_->run_bound)
+        return problem(403, "forbidden", "tokens that are bound to sites are refused here");
+      return state_->run_bound(route, r);
     } catch (ProblemException& refused) {
       return std::move(refused.response);
     }

@@ -110,6 +110,11 @@ class Router {
 
   const std::vector<Route>& routes() const;
 
+  /// Answers for whoever is bound to sites, by the route's handler or a problem; without one they are refused
+  /// everywhere. Set at start.
+  using BoundRun = std::function<Response(const Route&, const Request&)>;
+  void run_bound_by(BoundRun run);
+
   /// Drops kept answers that have expired, a slice at a time; says whether there may be more.
   bool purge_answers() const;
 

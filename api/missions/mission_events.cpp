@@ -26,18 +26,19 @@ void MissionService::State::publish_events(const Flight& flight,
 
 void MissionService::State::publish(const Flight& flight, const flight::FixShown& event) const {
   const std::int64_t t_us = event.fix.time.us();
-  deps.hub.publish(Topic::rtk_status, live_rtk_json(flight.id, event.fix), t_us, to_string(flight.id));
-  deps.hub.collect(Topic::fixes, live_fix_json(flight.id, event.fix), t_us);
+  deps.hub.publish(Topic::rtk_status, live_rtk_json(flight.id, event.fix), t_us, to_string(flight.id), {},
+                   flight.id);
+  deps.hub.collect(Topic::fixes, live_fix_json(flight.id, event.fix), t_us, flight.id);
 }
 
 void MissionService::State::publish(const Flight& flight, const flight::PoseMoved& event) const {
   deps.hub.publish(Topic::drone_pose, live_pose_json(flight.id, flight.frame, event), event.time.us(),
-                   to_string(flight.id));
+                   to_string(flight.id), {}, flight.id);
 }
 
 void MissionService::State::publish(Flight& flight, const flight::RangeDecided& event) {
   const auto& result = event.result;
-  deps.hub.collect(Topic::ranges, live_range_json(flight.id, result), result.range.time.us(),
+  deps.hub.collect(Topic::ranges, live_range_json(flight.id, result), result.range.time.us(), flight.id,
                    result.range.anchor);
 }
 
@@ -63,7 +64,8 @@ void MissionService::State::publish(Flight& flight, const flight::AnchorStatusCh
 void MissionService::State::publish(Flight& flight, const flight::AnchorEstimated& event) {
   const auto& estimate = event.estimate;
   deps.hub.publish(Topic::anchors_estimates, live_estimate_json(flight.id, estimate, event.models_moved_m),
-                   estimate.time.us(), to_string(flight.id) + to_string(estimate.anchor), estimate.anchor);
+                   estimate.time.us(), to_string(flight.id) + to_string(estimate.anchor), estimate.anchor,
+                   flight.id);
 }
 
 void MissionService::State::publish(Flight& flight, const flight::FixRejected& event) {

@@ -3,6 +3,7 @@
 #include "api/admin/event_log.hpp"
 #include "api/devices/device_stream.hpp"
 #include "api/kit/content_tag.hpp"
+#include "api/kit/current_sites.hpp"
 #include "api/kit/id_page.hpp"
 #include "api/kit/reader.hpp"
 #include "api/kit/support.hpp"
@@ -29,11 +30,16 @@ namespace {
 constexpr std::string_view k_finish = "finish", k_take_devices = "take_devices";
 constexpr std::string_view k_start = flight::k_flight_action_words.word(flight::FlightAction::start);
 
+/// Whether who asks may see this mission.
+bool sees(MissionApi& s, const MissionId& mission) {
+  return current_sites().all() || s.missions.mission(mission).has_value();
+}
+
 /// Whether it has the rows of this server's devices, and who has them instead; absent: there are none.
 void say_devices(MissionApi& s, const Mission& mission, Ordered& out) {
   const auto holder = s.stream.holder();
   Ordered devices{{"recording", holder && holder->id == mission.id}, {"held_by", nullptr}};
-  if (mission.state == MissionState::recording && holder && holder->id != mission.id)
+  if (mission.state == MissionState::recording && holder && holder->id != mission.id && sees(s, holder->id))
     devices["held_by"] = Ordered{{"mission", to_string(holder->id)}, {"name", holder->name}};
   out["devices"] = std::move(devices);
 }
@@ -86,6 +92,8 @@ void require_right_to_take(MissionApi& s, const Request& request, const MissionI
                            const std::string& lease) {
   const auto holder = s.stream.holder();
   if (!holder || holder->id == taker) return;
+  if (!sees(s, holder->id))
+    throw_problem(409, "no-control", "the devices record for another site: ask whoever runs this server");
   require_control(s, request, holder->id, lease,
                   holder->name + " (mission " + to_string(holder->id) +
                       ") is recording with the devices; to take them, send the lease of its control");
@@ -96,6 +104,7 @@ Response create(MissionApi& s, const Request& request) {
   auto body = json_body(request);
   const auto wanted = read_devices_wanted(request, body, errors);
   Mission mission = read_mission(body, errors);
+  mission.site = named_or_own(mission.site);
   if (mission.site && !s.sites.site(*mission.site))
     errors.push_back({"/site", "unknown_site", "there is no such site"});
   // A local frame has no place for a rover's positions.

@@ -1,6 +1,7 @@
 #include "api/missions/mission_service.hpp"
 
 #include "api/admin/event_log.hpp"
+#include "api/kit/current_sites.hpp"
 #include "api/missions/mission_service_state.hpp"
 #include "api/stream/hub.hpp"
 
@@ -21,10 +22,12 @@ Result<Mission> MissionService::mission(const MissionId& id) {
   {
     const auto known = state_->known.lock();
     const auto it = known->cache.find(id);
-    if (it != known->cache.end()) return it->second;
+    // One that is not of the sites is asked of the store, which has none for them.
+    if (it != known->cache.end() && current_sites().holds(it->second.site)) return it->second;
     forgotten = known->forgotten;
   }
   BOOST_OUTCOME_TRY(auto mission, state_->deps.missions.mission(id));
+  state_->deps.hub.mission_is_of(id, mission.site);
   auto known = state_->known.lock();
   if (known->cache.size() > 1000) known->cache.clear();
   if (forgotten == known->forgotten) known->cache[id] = mission;
@@ -38,7 +41,7 @@ Result<void> MissionService::create(const Mission& mission) {
   if (const auto flight = state_->find(mission.id)) {
     const auto work = flight->work.lock();
     state_->deps.hub.publish(Topic::mission_state, mission_state_json(mission, work->live.state()),
-                             mission.created.us(), to_string(mission.id));
+                             mission.created.us(), to_string(mission.id), {}, mission.id);
   }
   return boost::outcome_v2::success();
 }
@@ -75,6 +78,7 @@ void MissionService::forget(const MissionId& id) {
   }
   for (const Topic topic : {Topic::mission_state, Topic::drone_pose, Topic::rtk_status})
     state_->deps.hub.forget(topic, to_string(id));
+  state_->deps.hub.mission_is_of(id, std::nullopt);
 }
 
 void MissionService::prepare(const MissionId& id) {
@@ -158,11 +162,12 @@ std::vector<MissionService::LiveView> MissionService::live(const std::optional<M
     wanted = state_->all();
   } else if (auto flight = state_->find(*id)) {
     wanted.push_back(std::move(flight));
-  } else if (auto read = state_->read(*id)) {
+  } else if (auto read = state_->read(*id); read && current_sites().holds(read->mission.site)) {
     return {*std::move(read)};
   }
   std::vector<LiveView> out;
   for (const auto& flight : wanted) {
+    if (!current_sites().holds(State::mission_of(*flight).site)) continue;
     if (id) {
       auto inbox = flight->inbox.lock();
       inbox->used = state_->steady_now();
@@ -198,7 +203,7 @@ void MissionService::tick() {
     flight->dirty = false;
     state_->deps.hub.publish(Topic::mission_state,
                              mission_state_json(State::mission_of(*flight), work->live.state()),
-                             work->live.state().time.us(), to_string(flight->id));
+                             work->live.state().time.us(), to_string(flight->id), {}, flight->id);
   }
   if (++state_->ticks % 2 == 0) state_->publish_devices();
   state_->evict();

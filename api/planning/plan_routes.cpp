@@ -2,6 +2,7 @@
 
 #include "api/formats/kml_plan.hpp"
 #include "api/formats/plan_export.hpp"
+#include "api/kit/current_sites.hpp"
 #include "api/kit/id_page.hpp"
 #include "api/kit/reader.hpp"
 #include "api/kit/support.hpp"
@@ -41,6 +42,7 @@ Response list(PlanningApi& s, const Request& request) {
 
 /// Stores a plan that was read; refuses what is wrong with it.
 Response store_new(PlanningApi& s, const Request& request, Plan plan, std::vector<FieldError> errors) {
+  plan.site = named_or_own(plan.site);
   if (plan.site && !s.sites.site(*plan.site))
     errors.push_back({"/site", "unknown_site", "there is no such site"});
   refuse_if_any(errors);
@@ -62,6 +64,7 @@ Response create(PlanningApi& s, const Request& request) {
 
 Response replace(PlanningApi& s, const Request& request, const Plan& old, Plan plan,
                  std::vector<FieldError> errors) {
+  plan.site = named_or_own(plan.site);
   if (plan.site && !s.sites.site(*plan.site))
     errors.push_back({"/site", "unknown_site", "there is no such site"});
   refuse_if_any(errors);

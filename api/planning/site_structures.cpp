@@ -3,6 +3,7 @@
 #include <vector>
 
 #include "api/formats/floor_structure.hpp"
+#include "api/kit/current_sites.hpp"
 #include "core/ports/place_store.hpp"
 
 namespace anchord::api {
@@ -33,7 +34,7 @@ void SiteStructures::changed() {
 
 Result<void> SiteStructures::join(Plan& plan) {
   plan.structure.reset();
-  if (!plan.site) return boost::outcome_v2::success();
+  if (!plan.site || !current_sites().holds(plan.site)) return boost::outcome_v2::success();
   BOOST_OUTCOME_TRY(plan.structure, of(*plan.site));
   return boost::outcome_v2::success();
 }

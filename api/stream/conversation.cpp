@@ -27,8 +27,7 @@ std::int64_t steady_us() {
 std::string snap_of(const Subscription& subscription, const Resumed& start, bool keyed) {
   std::vector<LiveElement> wanted;
   for (const auto& element : start.snapshot) {
-    if (subscription.anchors.empty() || !element.anchor || subscription.anchors.count(*element.anchor) > 0)
-      wanted.push_back(element);
+    if (subscription.wants(element)) wanted.push_back(element);
   }
   return snap_frame(subscription.id, start.last_seq, start.t_us, wanted, keyed);
 }
@@ -129,6 +128,7 @@ void Conversation::subscribe(const Json& message) {
     return;
   }
   subscription.topic = topic->topic;
+  subscription.sites = principal_.sites;
   subscription.id = default_sub(topic->topic);
   // The usual number lets all clients share the bytes of a frame; a second subscription of the topic gets its
   // own.

@@ -59,16 +59,38 @@ Hub::Hub(const Clock& clock, std::string server_name)
       server_name_(std::move(server_name)),
       epoch_(to_string(make_uuid_v7(clock.now())).substr(0, 23)) {}
 
-void Hub::publish(Topic topic, std::string json, std::int64_t t_us, std::string key,
-                  std::optional<NetworkId> anchor) {
-  LiveElement element{std::move(key), anchor, std::make_shared<const std::string>(std::move(json))};
+std::optional<SiteId> Hub::Bus::site_of(const std::optional<MissionId>& mission) const {
+  if (!mission) return std::nullopt;
+  const auto at = sites.find(*mission);
+  return at == sites.end() ? std::nullopt : std::optional(at->second);
+}
+
+void Hub::mission_is_of(const MissionId& mission, const std::optional<SiteId>& site) {
   auto bus = bus_.lock();
+  if (site)
+    bus->sites[mission] = *site;
+  else
+    bus->sites.erase(mission);
+}
+
+std::optional<SiteId> Hub::site_of(const MissionId& mission) const {
+  const auto bus = bus_.lock();
+  return bus->site_of(mission);
+}
+
+void Hub::publish(Topic topic, std::string json, std::int64_t t_us, std::string key,
+                  std::optional<NetworkId> anchor, const std::optional<MissionId>& mission) {
+  LiveElement element{std::move(key), anchor, std::make_shared<const std::string>(std::move(json)), {}};
+  auto bus = bus_.lock();
+  element.site = bus->site_of(mission);
   send(*bus, topic, {std::move(element)}, t_us);
 }
 
-void Hub::collect(Topic topic, std::string json, std::int64_t t_us, std::optional<NetworkId> anchor) {
-  LiveElement element{{}, anchor, std::make_shared<const std::string>(std::move(json))};
+void Hub::collect(Topic topic, std::string json, std::int64_t t_us, const MissionId& mission,
+                  std::optional<NetworkId> anchor) {
+  LiveElement element{{}, anchor, std::make_shared<const std::string>(std::move(json)), {}};
   auto bus = bus_.lock();
+  element.site = bus->site_of(mission);
   auto& channel = bus->of(topic);
   channel.collected.push_back(std::move(element));
   channel.collected_t_us = t_us;

@@ -60,6 +60,7 @@ struct LiveElement {
   std::string key;                    ///< of a state topic
   std::optional<NetworkId> anchor{};  ///< for params.anchors
   std::shared_ptr<const std::string> json;
+  std::optional<SiteId> site{};  ///< of its mission; none: for those who see all sites
 };
 
 /// What one publish() made: its number in the topic and its elements.
@@ -135,11 +136,16 @@ class Hub {
   const std::string& server_name() const { return server_name_; }
   const Clock& clock() const { return clock_; }
 
-  /// Sends one object now. `json` is a complete JSON value.
+  /// Whom what is published of a mission is for, from now on.
+  void mission_is_of(const MissionId& mission, const std::optional<SiteId>& site);
+  std::optional<SiteId> site_of(const MissionId& mission) const;
+  /// Sends one object now. `json` is a complete JSON value; `mission`: what it is of, for those who see only
+  /// some sites.
   void publish(Topic topic, std::string json, std::int64_t t_us, std::string key = {},
-               std::optional<NetworkId> anchor = {});
+               std::optional<NetworkId> anchor = {}, const std::optional<MissionId>& mission = {});
   /// Collects an element of a stream; tick() sends them together, at most 20 frames a second.
-  void collect(Topic topic, std::string json, std::int64_t t_us, std::optional<NetworkId> anchor = {});
+  void collect(Topic topic, std::string json, std::int64_t t_us, const MissionId& mission,
+               std::optional<NetworkId> anchor = {});
   /// Forgets a key of a state topic (a removed mission).
   void forget(Topic topic, const std::string& key);
 
@@ -183,6 +189,8 @@ class Hub {
     const Channel& of(Topic topic) const { return channels[static_cast<std::size_t>(topic)]; }
     std::array<Channel, k_topic_count> channels{};
     std::set<HubListener*> connections{};
+    std::map<MissionId, SiteId> sites{};  ///< of the missions that have one
+    std::optional<SiteId> site_of(const std::optional<MissionId>& mission) const;
     std::int64_t last_heartbeat_us{0};
     bool closed{false};
   };

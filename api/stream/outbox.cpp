@@ -14,10 +14,6 @@ constexpr std::array<std::string_view, 2> k_identity{"mission", "anchor"};
 /// A client that asked for less is not slow before its frame is overdue by this.
 constexpr std::int64_t k_grace_us = 200'000;
 
-bool wants(const Subscription& subscription, const LiveElement& element) {
-  return subscription.anchors.empty() || !element.anchor || subscription.anchors.count(*element.anchor) > 0;
-}
-
 }  // namespace
 
 void Outbox::add(const Subscription& subscription) { queues_[subscription.id].subscription = subscription; }
@@ -40,12 +36,12 @@ void Outbox::start(std::uint64_t sub, std::uint64_t last_seq,
   queue.started = true;
   if (queue.subscription.deltas) {
     for (const auto& element : snapshot)
-      if (wants(queue.subscription, element)) queue.shown[element.key] = element.json;
+      if (queue.subscription.wants(element)) queue.shown[element.key] = element.json;
   }
   for (const auto& message : missed) {
     const auto& elements = message->elements;
     if (std::any_of(elements.begin(), elements.end(),
-                    [&](const auto& e) { return wants(queue.subscription, e); }))
+                    [&](const auto& e) { return queue.subscription.wants(e); }))
       queue.replay.push_back({message, INT64_MAX / 2});
   }
 }
@@ -74,12 +70,12 @@ bool Outbox::put(const std::shared_ptr<const LiveMessage>& message, Topic topic,
     if (queue.subscription.topic != topic) continue;
     const auto& elements = message->elements;
     const bool any = std::any_of(elements.begin(), elements.end(),
-                                 [&](const auto& e) { return wants(queue.subscription, e); });
+                                 [&](const auto& e) { return queue.subscription.wants(e); });
     if (!any) continue;
     if (cls == TopicClass::state) {
       queue.only = queue.newest.empty() ? message : nullptr;
       for (const auto& element : elements) {
-        if (!wants(queue.subscription, element)) {
+        if (!queue.subscription.wants(element)) {
           queue.only = nullptr;
           continue;
         }
@@ -256,7 +252,7 @@ std::shared_ptr<const std::string> Outbox::take_messages(Queue& queue, std::dequ
                                                          bool merge) {
   const bool counted = &from == &queue.messages;
   auto& subscription = queue.subscription;
-  const bool filtered = !subscription.anchors.empty();
+  const bool filtered = !subscription.anchors.empty() || !subscription.sites.all();
   std::vector<LiveElement> elements;
   std::shared_ptr<const LiveMessage> last;
   std::size_t taken = 0, size = 0;
@@ -271,7 +267,7 @@ std::shared_ptr<const std::string> Outbox::take_messages(Queue& queue, std::dequ
     ++taken;
     size += last->bytes();
     for (const auto& element : last->elements) {
-      if (wants(subscription, element)) elements.push_back(element);
+      if (subscription.wants(element)) elements.push_back(element);
     }
   }
   std::shared_ptr<const std::string> frame;

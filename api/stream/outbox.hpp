@@ -11,6 +11,7 @@
 
 #include "api/stream/hub.hpp"
 #include "api/stream/unseen.hpp"
+#include "core/base/site_set.hpp"
 
 namespace anchord::api {
 
@@ -19,11 +20,17 @@ struct Subscription {
   std::uint64_t id{};
   Topic topic{};
   std::set<NetworkId> anchors{};    ///< empty: all
+  SiteSet sites{};                  ///< what of the topic the client may see
   std::int64_t min_interval_us{0};  ///< of max_hz
   std::int64_t max_age_us{0};  ///< of max_age_s: what of a stream has waited longer is dropped; 0: nothing
   /// Of a state topic: only what changed since the last frame, at most k_delta_bytes_per_s.
   bool deltas{false};
   std::uint64_t last_seq{0};  ///< last seq this subscription was sent, for `prev`
+
+  bool wants(const LiveElement& element) const {
+    return sites.holds(element.site) &&
+           (anchors.empty() || !element.anchor || anchors.count(*element.anchor) > 0);
+  }
 };
 
 /// What waits for one client, by the three rules of TopicClass. At most 1 MiB or 512 messages of streams,

@@ -7,6 +7,7 @@
 
 #include "core/base/ids.hpp"
 #include "core/base/result.hpp"
+#include "core/base/site_set.hpp"
 #include "core/base/time.hpp"
 
 namespace anchord {
@@ -19,6 +20,7 @@ struct Token {
   std::vector<std::string> roles;
   UtcTime created{};
   std::optional<UtcTime> expires{}, revoked{}, last_used{};
+  SiteSet sites{};  ///< what it is bound to
 };
 
 class TokenStore {

@@ -162,6 +162,9 @@ bool may_watch(const api::Principal& who) {
   return api::Access::any_of({viewer, integrator, engineer, op}).permits(who);
 }
 
+/// Locations are of every flight there is.
+bool may_watch_omlox(const api::Principal& who) { return may_watch(who) && who.sites.all(); }
+
 /// To a plain GET of a WebSocket's address.
 api::Response upgrade_needed(const char* type, const char* detail) {
   auto response = api::problem(426, type, detail);
@@ -218,7 +221,7 @@ std::function<bool()> Authenticator::let_in(const api::Request& request, std::st
     (void)access_.guard().failed(token, request.remote, api::LoginGuard::Clock::now());
     return {};
   }
-  if (!may_watch(*who)) {
+  if (!may_watch_omlox(*who)) {
     access_.note_refusal(who->token_id, "GET " + std::string(k_omlox_path), request.remote);
     return {};
   }
@@ -233,9 +236,10 @@ Admission Authenticator::live_omlox(const api::Request& request, bool websocket,
   const api::Principal& who = request.principal;
   if (!websocket && who.roles.empty())
     return refused(problem(401, "unauthorized", "send a token in the header Authorization: Bearer"), route);
-  if (!who.roles.empty() && !may_watch(who)) {
+  if (!who.roles.empty() && !may_watch_omlox(who)) {
     access_.note_refusal(who.token_id, "GET " + route, request.remote);
-    return refused(problem(403, "forbidden", "live data needs the role viewer"), route);
+    return refused(problem(403, "forbidden", "live locations need the role viewer and a token of every site"),
+                   route);
   }
   if (!websocket) return refused(upgrade_needed("method", "this is a WebSocket: ask for an upgrade"), route);
   Admission admission;

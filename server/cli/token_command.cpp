@@ -4,6 +4,7 @@
 #include "api/admin/access.hpp"
 #include "api/measurements/flight_requests.hpp"
 #include "core/base/text.hpp"
+#include "core/ports/site_store.hpp"
 #include "server/cli/commands.hpp"
 #include "server/cli/config_flags.hpp"
 #include "server/cli/server_address.hpp"
@@ -17,7 +18,7 @@ namespace {
 
 struct Options {
   std::string data_dir{"anchord-data"}, database, url, name, expires, id;
-  std::vector<std::string> roles;
+  std::vector<std::string> roles, sites;
 };
 
 /// "365d", "12h", or a UTC time. Errors: invalid_argument.
@@ -81,7 +82,21 @@ int with_folder(const Options& options, Act act) {
   const SystemClock clock;
   api::AccessService access(database.value()->stores().tokens, database.value()->stores().access, clock);
   if (const auto loaded = access.load(); !loaded) return fail(loaded.error().message);
-  return act(access);
+  return act(access, *database.value());
+}
+
+/// Errors: invalid_argument where there is no such site.
+Result<SiteSet> sites_of(const std::vector<std::string>& texts, SiteStore& known) {
+  if (texts.empty()) return SiteSet{};
+  std::vector<SiteId> sites;
+  for (const auto& text : texts) {
+    const auto id = parse_uuid(text);
+    if (!id || !known.site(SiteId{id.value()}))
+      return make_error(Errc::invalid_argument,
+                        "--site " + text + ": there is no such site; the ids are in GET /api/v1/sites");
+    sites.push_back(SiteId{id.value()});
+  }
+  return SiteSet::only(std::move(sites));
 }
 
 int create(const Options& options) {
@@ -91,12 +106,18 @@ int create(const Options& options) {
     std::string roles;
     for (const auto& role : options.roles) roles += (roles.empty() ? "" : ",") + json_text(role);
     std::string body = R"({"name":)" + json_text(options.name) + R"(,"roles":[)" + roles + "]";
+    std::string sites;
+    for (const auto& site : options.sites) sites += (sites.empty() ? "" : ",") + json_text(site);
+    if (!sites.empty()) body += R"(,"sites":[)" + sites + "]";
     if (expires.value()) body += R"(,"expires_at":")" + to_rfc3339(*expires.value()) + "\"";
     return through_server(options, *url, "POST", "/api/v1/tokens", body + "}");
   }
-  return with_folder(options, [&](api::AccessService& access) {
+  return with_folder(options, [&](api::AccessService& access, Database& database) {
     const api::Principal who{"command line", "command line", {}};
-    const auto made = access.create_token(options.name, options.roles, expires.value(), who, "local");
+    const auto sites = sites_of(options.sites, database.stores().sites);
+    if (!sites) return fail(sites.error().message, 2);
+    const auto made =
+        access.create_token(options.name, options.roles, expires.value(), who, "local", sites.value());
     if (!made) return fail(made.error().message, 2);
     std::fprintf(stderr, "token %s, shown once:\n", to_string(made.value().token.id).c_str());
     std::printf("%s\n", made.value().text.c_str());
@@ -106,15 +127,20 @@ int create(const Options& options) {
 
 int list(const Options& options) {
   if (const auto url = server_of(options)) return through_server(options, *url, "GET", "/api/v1/tokens", {});
-  return with_folder(options, [](api::AccessService& access) {
+  return with_folder(options, [](api::AccessService& access, Database&) {
     for (const auto& token : access.tokens()) {
       std::string roles;
       for (const auto& role : token.roles) roles += (roles.empty() ? "" : ",") + role;
       const std::string state = token.revoked   ? "revoked " + to_rfc3339(*token.revoked)
                                 : token.expires ? "expires " + to_rfc3339(*token.expires)
                                                 : "no expiry";
-      std::printf("%s  %-20s  %s  %s\n", to_string(token.id).c_str(), token.name.c_str(), roles.c_str(),
-                  state.c_str());
+      std::string sites = "every site";
+      if (!token.sites.all()) {
+        sites = "sites";
+        for (const auto& id : token.sites.sites()) sites += ' ' + to_string(id);
+      }
+      std::printf("%s  %-20s  %s  %s  %s\n", to_string(token.id).c_str(), token.name.c_str(), roles.c_str(),
+                  state.c_str(), sites.c_str());
     }
     return 0;
   });
@@ -126,7 +152,7 @@ int revoke(const Options& options) {
   if (const auto url = server_of(options)) {
     return through_server(options, *url, "DELETE", "/api/v1/tokens/" + options.id, {});
   }
-  return with_folder(options, [&](api::AccessService& access) {
+  return with_folder(options, [&](api::AccessService& access, Database&) {
     const api::Principal who{"command line", "command line", {}};
     const auto done = access.revoke_token(TokenId{id.value()}, who, "local");
     return done ? 0 : fail(done.error().message);
@@ -151,6 +177,8 @@ void add_token_command(CLI::App& app, int& exit_code) {
   make->add_option("--role", options->roles,
                    "viewer, integrator, gateway, engineer, operator, admin; may be repeated")
       ->required();
+  make->add_option("--site", options->sites,
+                   "id of a site that the token is bound to; may be repeated [every site]");
   make->add_option("--expires", options->expires, "like 365d, 12h or 2027-01-31T00:00:00Z [never]");
   make->callback([&exit_code, options] { exit_code = create(*options); });
   auto* show = command->add_subcommand("list", "List tokens (without their secrets)");

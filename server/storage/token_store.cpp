@@ -5,13 +5,15 @@ namespace {
 
 constexpr const char* k_insert =
     "INSERT INTO token (id, name, secret_sha256_hex, created_t_ns, expires_t_ns, revoked_t_ns, "
-    "last_used_t_ns) "
-    "VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7)";
+    "last_used_t_ns, bound) "
+    "VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8)";
 constexpr const char* k_insert_role = "INSERT INTO token_role (token_id, ordinal, role) VALUES (?1, ?2, ?3)";
+constexpr const char* k_insert_site = "INSERT INTO token_site (token_id, site_id) VALUES (?1, ?2)";
 constexpr const char* k_columns =
-    "SELECT id, name, secret_sha256_hex, created_t_ns, expires_t_ns, revoked_t_ns, last_used_t_ns FROM "
-    "token ";
+    "SELECT id, name, secret_sha256_hex, created_t_ns, expires_t_ns, revoked_t_ns, last_used_t_ns, bound "
+    "FROM token ";
 constexpr const char* k_roles = "SELECT role FROM token_role WHERE token_id = ?1 ORDER BY ordinal";
+constexpr const char* k_sites = "SELECT site_id FROM token_site WHERE token_id = ?1";
 // A second revocation keeps the time of the first.
 constexpr const char* k_revoke =
     "UPDATE token SET revoked_t_ns = coalesce(revoked_t_ns, ?2) WHERE id = ?1 RETURNING revoked_t_ns";
@@ -26,9 +28,16 @@ Token read(Connection& c, Query& query) {
   token.expires = query.maybe_time();
   token.revoked = query.maybe_time();
   token.last_used = query.maybe_time();
+  const bool bound = query.integer() != 0;
   Query roles(c, k_roles);
   roles << token.id;
   while (roles.step()) token.roles.push_back(roles.text());
+  if (!bound) return token;
+  std::vector<SiteId> ids;
+  Query sites(c, k_sites);
+  sites << token.id;
+  while (sites.step()) ids.push_back(sites.id<SiteId>());
+  token.sites = SiteSet::only(std::move(ids));
   return token;
 }
 
@@ -40,13 +49,19 @@ class SqlTokenStore final : public TokenStore {
     return write_void(gate_, [&](Connection& c) -> std::optional<Error> {
       Query query(c, k_insert);
       query << token.id << token.name << token.secret_sha256_hex << token.created << token.expires
-            << token.revoked << token.last_used;
+            << token.revoked << token.last_used << !token.sites.all();
       query.run();
       std::int64_t ordinal = 0;
       for (const std::string& role : token.roles) {
         Query insert_role(c, k_insert_role);
         insert_role << token.id << ordinal++ << role;
         insert_role.run();
+      }
+      if (token.sites.all()) return std::nullopt;
+      for (const SiteId& site : token.sites.sites()) {
+        Query insert_site(c, k_insert_site);
+        insert_site << token.id << site;
+        insert_site.run();
       }
       return std::nullopt;
     });

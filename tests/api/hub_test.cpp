@@ -433,7 +433,7 @@ TEST_F(HubRules, SurvivesTwoThousandClientsComingAndGoing) {
   threads.emplace_back([&] {
     for (int n = 0; !done; ++n) {
       hub_.publish(Topic::events, R"({"n":1})", n);
-      hub_.collect(Topic::ranges, R"({"n":1})", n, NetworkId{0x6a2f});
+      hub_.collect(Topic::ranges, R"({"n":1})", n, MissionId{}, NetworkId{0x6a2f});
       hub_.publish(Topic::drone_pose, R"({"n":1})", n, "m");
     }
   });

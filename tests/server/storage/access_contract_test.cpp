@@ -29,6 +29,30 @@ TEST_P(AccessContract, FindsATokenBySecretAndKeepsTheFirstRevocation) {
   EXPECT_EQ(db_->stores().tokens.tokens().value().size(), 1u);
 }
 
+TEST_P(AccessContract, KeepsTheSitesThatATokenIsBoundTo) {
+  const SiteId north{make_uuid_v7(k_noon)}, south{make_uuid_v7(k_noon)};
+  Token bound{TokenId{make_uuid_v7(k_noon)}, "north", std::string(64, 'a'), {"viewer"}, k_noon, {}, {}, {}};
+  bound.sites = SiteSet::only({south, north, north});
+  Token nothing = bound;
+  nothing.id = TokenId{make_uuid_v7(k_noon)};
+  nothing.secret_sha256_hex = std::string(64, 'b');
+  nothing.sites = SiteSet::only({});
+  Token all = nothing;
+  all.id = TokenId{make_uuid_v7(k_noon)};
+  all.secret_sha256_hex = std::string(64, 'c');
+  all.sites = {};
+  for (const auto& token : {bound, nothing, all}) ASSERT_TRUE(db_->stores().tokens.insert(token));
+  const auto found = db_->stores().tokens.token(bound.id).value().sites;
+  ASSERT_FALSE(found.all());
+  EXPECT_THAT(found.sites(), ElementsAre(north, south));
+  EXPECT_TRUE(found.holds(north));
+  EXPECT_FALSE(found.holds(std::nullopt));
+  const auto none = db_->stores().tokens.token_by_secret(std::string(64, 'b')).value().sites;
+  EXPECT_FALSE(none.all());
+  EXPECT_FALSE(none.holds(north));
+  EXPECT_TRUE(db_->stores().tokens.token(all.id).value().sites.all());
+}
+
 TEST_P(AccessContract, FailsJobsThatARestartCutOff) {
   Job running;
   running.id = JobId{make_uuid_v7(k_noon)};

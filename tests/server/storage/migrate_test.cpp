@@ -60,7 +60,8 @@ TEST_F(Migrate, FindsEveryLandedMigrationAsItWas) {
             "12 772f473e05d3ce7c38825e4939476ca713a0069c8b4555c9abcce6f130781942\n"
             "13 845d3d59444816e9878b0455545bdeeba14f292f9fcd6ca1591df6771568df0c\n"
             "14 07550435216e8f5b8dde3ec2b19bcbc653d17024461c3afb34ea1d91a477033b\n"
-            "15 c4d0c3098b96c7b66b1bcd1603afcbaf7bd527a53a085cbc772bf58472a4a1a6\n");
+            "15 c4d0c3098b96c7b66b1bcd1603afcbaf7bd527a53a085cbc772bf58472a4a1a6\n"
+            "16 6c1d5f68e7d310e7397bff93064ab2eea45da27703ed075ce627ae502304aafe\n");
 }
 
 TEST_F(Migrate, KnowsTheDigestOfAPublishedVector) {

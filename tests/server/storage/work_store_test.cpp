@@ -307,7 +307,8 @@ TEST_F(PostgresWork, ARoleWithTheRightsOfTheDocumentCanWorkAndReadNothingElse) {
 }
 
 TEST_F(PostgresWork, AProgramOfAnotherSchemaIsRefusedWithWhatToDo) {
-  sql::PostgresConnection(address()).execute("DELETE FROM schema_migration WHERE number = 15");
+  sql::PostgresConnection(address()).execute(
+      "DELETE FROM schema_migration WHERE number = (SELECT max(number) FROM schema_migration)");
   const auto refused = open_work(address());
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().code, Errc::unsupported);

@@ -7,12 +7,15 @@ export interface Me {
   readonly name: string;
   readonly roles: readonly string[];
   readonly auth: string;
+  readonly sites: readonly string[] | null; ///< that the token is bound to; null: every site
 }
 /// undefined: not asked yet; null: signed out.
 export const me = signal<Me | null | undefined>(undefined);
 
 export const may = (...roles: string[]): boolean =>
   !!me.value && (me.value.auth === 'off' || me.value.roles.some((r) => r === 'admin' || roles.includes(r)));
+/// What is of the whole server (devices, models, tokens) is refused to a token that is bound to sites.
+export const of_every_site = computed(() => !me.value?.sites);
 export const may_publish = computed(() => may('engineer', 'operator', 'op'));
 
 function me_of(answer: Unchecked<Wire<'Me'>>): Me | null {
@@ -21,6 +24,7 @@ function me_of(answer: Unchecked<Wire<'Me'>>): Me | null {
     o && {
       name: str(o.name),
       roles: texts(o.roles),
+      sites: Array.isArray(o.sites) ? texts(o.sites) : null,
       auth: str(o.auth) || (str(o.token_id) === 'local' ? 'off' : 'on'),
     }
   );

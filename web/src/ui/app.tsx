@@ -1,6 +1,7 @@
 import { signal } from '@preact/signals';
 import type { ComponentType } from 'preact';
 import { useEffect } from 'preact/hooks';
+import { of_every_site } from '../state/session';
 import { link, toast } from '../state/store';
 import { load_compare, load_publish } from '../views/dialog_chunks';
 import { Live } from '../views/live';
@@ -45,7 +46,7 @@ function Rail({ view }: { view: View | null }) {
   );
   return (
     <nav class="rail" aria-label="Views">
-      {VIEWS.map(([id, name]) => item(id, name))}
+      {VIEWS.map(([id, name]) => (id !== 'models' || of_every_site.value) && item(id, name))}
       <span class="grow" />
       <button class="ri" onClick={() => (help_open.value = !help_open.value)} aria-expanded={help_open.value}>
         <Icon name="help" />

@@ -4,7 +4,7 @@ import './start.css';
 import { error_text } from '../../api/client';
 import { idempotency_key } from '../../api/client';
 import { call } from '../../api/contract';
-import { may } from '../../state/session';
+import { may, of_every_site } from '../../state/session';
 import { CopyBox } from '../../ui/copy_box';
 
 const SPEED = 4; ///< times real time: a minute to the first positions of anchors
@@ -47,16 +47,18 @@ export function FirstRun() {
         )}
         {able && (
           <div class="choicesbig">
-            <section>
-              <h2>See how it works</h2>
-              <p>
-                A simulated drone flies round a building with six anchors, four times as fast as a real one. It needs no
-                hardware and takes a minute.
-              </p>
-              <button class="btn primary" data-testid="fly-demonstration" disabled={busy} onClick={() => void fly()}>
-                {busy ? 'Starting' : 'Fly the demonstration'}
-              </button>
-            </section>
+            {of_every_site.value && (
+              <section>
+                <h2>See how it works</h2>
+                <p>
+                  A simulated drone flies round a building with six anchors, four times as fast as a real one. It needs
+                  no hardware and takes a minute.
+                </p>
+                <button class="btn primary" data-testid="fly-demonstration" disabled={busy} onClick={() => void fly()}>
+                  {busy ? 'Starting' : 'Fly the demonstration'}
+                </button>
+              </section>
+            )}
             <section>
               <h2>Fly for real</h2>
               <p>

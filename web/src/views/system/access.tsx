@@ -14,7 +14,7 @@ import {
 import { say } from '../../state/store';
 import { Empty, useLoad } from '../../ui/empty';
 import { CopyBox } from '../../ui/copy_box';
-import { date } from '../../ui/format';
+import { date, grouped } from '../../ui/format';
 
 const ROLE_WORDS: Record<string, string> = {
   viewer: 'sees everything',
@@ -123,6 +123,7 @@ export function AccessPanel() {
           <tr>
             <th scope="col">Token</th>
             <th scope="col">Role</th>
+            <th scope="col">Sites</th>
             <th scope="col">Last used</th>
             <th scope="col">Ends</th>
             <th scope="col">
@@ -138,6 +139,7 @@ export function AccessPanel() {
                 <span class="mut block">made {date(t.created_at)}</span>
               </th>
               <td>{t.roles.join(', ')}</td>
+              <td>{t.sites ? grouped(t.sites.length) : <span class="mut">every site</span>}</td>
               <td>{t.last_used_at ? date(t.last_used_at) : <span class="mut">never</span>}</td>
               <td>{t.expires_at ? date(t.expires_at) : <span class="mut">never</span>}</td>
               <td class="acts">

@@ -9,7 +9,7 @@ import {
   stored_flights,
   type StoredFlight,
 } from '../../api/missions';
-import { may } from '../../state/session';
+import { may, of_every_site } from '../../state/session';
 import { load_missions } from '../../state/archive';
 import { events, say, when_back } from '../../state/store';
 import { Empty } from '../../ui/empty';
@@ -100,7 +100,7 @@ export function FlightsPanel() {
               <td>{grouped(f.n_ranges)}</td>
               <td>{grouped(f.n_fixes)}</td>
               <td>
-                {f.state !== 'recording' && (
+                {of_every_site.value && f.state !== 'recording' && (
                   <a
                     class="btn small"
                     href={handover_url(f.id)}

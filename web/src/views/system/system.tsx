@@ -2,7 +2,7 @@
 import { useEffect, useState } from 'preact/hooks';
 import './system.css';
 import { checks as fetch_checks, version as fetch_version, type Check, type Version } from '../../api/system';
-import { may } from '../../state/session';
+import { may, of_every_site } from '../../state/session';
 import { system } from '../../state/store';
 import { NotLoaded, useLoad } from '../../ui/empty';
 import { bytes, fixed, grouped } from '../../ui/format';
@@ -28,14 +28,14 @@ export function System({ part }: { part: string | null }) {
           System is shown.
         </Unknown>
       )}
-      <DevicesPanel guided={part === 'connect'} />
+      {of_every_site.value && <DevicesPanel guided={part === 'connect'} />}
       <BasePanel />
-      <LeverPanel />
-      <TimePanel />
+      {of_every_site.value && <LeverPanel />}
+      {of_every_site.value && <TimePanel />}
       <FlightsPanel />
       <HealthPanel />
-      {may('admin') && <AccessPanel />}
-      {may('admin') && <AuditPanel />}
+      {of_every_site.value && may('admin') && <AccessPanel />}
+      {of_every_site.value && may('admin') && <AuditPanel />}
     </div>
   );
 }
@@ -111,7 +111,7 @@ function HealthPanel() {
           .
         </p>
       )}
-      {may('admin') && (
+      {of_every_site.value && may('admin') && (
         <p class="sub">
           <a class="btn" href="api/v1/support-bundle" download="anchord-support.tar" data-testid="support-bundle">
             Download a support bundle
