@@ -20,7 +20,13 @@ after(async () => {
 
 /** By test id, or by the words beside it where it has none. */
 const fields = {
-  pozyx: ['device-path', /^Anchors to range to/, 'Impulse response', /^Between anchors/, /Heading from its compass/],
+  pozyx: [
+    'device-path',
+    /^Anchors to range to/,
+    'Impulse response',
+    /^Seconds between ranges/,
+    /Heading from its compass/,
+  ],
   dwm1001: ['device-path', 'device-mode', 'device-tag'],
   mqtt: [
     'device-host',
@@ -40,7 +46,7 @@ const fields = {
     /^User$/,
     'device-password',
     'NTRIP version',
-    /Send it the position/,
+    /Send the position/,
   ],
 };
 const of_any = [...new Set(Object.values(fields).flat())];
@@ -100,7 +106,7 @@ test('what is missing is said before it is sent, what the server rejects stands 
   await id('device-port').fill(port);
   await lack(/Mapping: missing/);
   await id('device-mapping').fill('{"tag": "/id",}');
-  await lack(/no valid JSON/);
+  await lack(/not valid JSON/);
   const mapping = { tag: '/id', anchor: '/to', distance: { pointer: '/mm', unit: 'mm' } };
   await id('device-mapping').fill(JSON.stringify({ ...mapping, surplus: 1 }));
   await id('device-send').click();

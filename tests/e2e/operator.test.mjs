@@ -132,7 +132,7 @@ test('what was loaded while nothing else was to be done opens during an outage',
       assert.match(await text(id(panel)), /Not loaded: no connection to the server/, panel);
     assert.doesNotMatch(
       await text(id('system')),
-      /No flight is stored|No token is valid|there is none yet|No site yet/,
+      /No flight is stored|There is no valid token|there is none yet|No site yet/,
     );
     await id('nav-plan').click();
     await eventually('plan', async () => /Not loaded: no connection/.test(await text(id('plan'))), 5000);

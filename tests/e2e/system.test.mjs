@@ -187,7 +187,7 @@ test('the radio of a tag is compared with every anchor in its reach', async () =
   const told = await text(id('radio-compared')),
     { devices } = await get(`/api/v1/devices/${made.good}/uwb-settings?devices=true`);
   assert.ok(devices.length >= 3, JSON.stringify(devices));
-  assert.match(told, /All \d anchors it knows have the same settings|\d of \d anchors could not be seen/);
+  assert.match(told, /All \d anchors it knows have the same settings|\d of \d anchors could not be verified/);
   assert.deepEqual(await violations(page), []);
   assert.deepEqual(seen.errors, []);
   await page.close();

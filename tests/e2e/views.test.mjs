@@ -97,7 +97,7 @@ test('runs ticked in the table stand side by side, with the figures of the API a
     shown,
     accuracy.map((a) => Number((100 * a).toFixed(1))),
   );
-  await id('compare').getByText('Not trained on one data set').waitFor();
+  await id('compare').getByText('Not trained on the same data set').waitFor();
   assert.match(page.url(), new RegExp(`compare=${training.id},${second.id}`));
   assert.deepEqual(await violations(page), []);
   await picture(page, 'compare-light');
@@ -249,7 +249,7 @@ test("the filter is the server's: the list, the count and the file are of the sa
   assert.deepEqual(await violations(page), []);
   // No model is promoted: no measurement of the flight is called LOS, and the way out is said.
   await id('predicted').selectOption('los');
-  await page.getByText('Nothing passes this filter').waitFor();
+  await page.getByText('No measurement passes this filter').waitFor();
   await id('reset').click();
   await eventually('all are back', async () => (await count())[0] === items.length);
   assert.deepEqual(seen.errors, []);
@@ -358,7 +358,7 @@ test('a campaign of impulse responses is imported, and a sample shows its respon
   await id('taps-toggle').focus();
   await page.keyboard.press('Enter');
   assert.match(await text(id('taps').locator('tbody th', { hasText: 'strongest' })), /^740/);
-  // Kept beside, the first stays under the second.
+  // Kept for comparison, the first stays under the second.
   await id('keep').click();
   await page.keyboard.press('j');
   await plot.locator('[data-mark="kept"]').waitFor();
@@ -395,7 +395,7 @@ test("facility data of an anchor are edited where they stand, kept over a reload
     200,
   );
   await id('facility-save').click();
-  await id('facility').getByText('Somebody changed this anchor meanwhile').waitFor();
+  await id('facility').getByText('Somebody else has changed this anchor').waitFor();
   assert.equal(await form.getByLabel('Room').inputValue(), 'A0.12');
   assert.deepEqual(await violations(page), []);
   await picture(page, 'facility-light');

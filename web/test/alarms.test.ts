@@ -80,7 +80,7 @@ describe('Conditions', () => {
   });
   it('call a link too slow by its name, and list it as advisory while the server helps itself', () => {
     const lost = new Conditions().standing({ ...calm, link: 'lost', silence_ms: 300, data_age_ms: 8000, now_ms: 9000 });
-    expect(lost[0]).toMatchObject({ id: 'link.lost', title: 'Link too slow: what arrives is old', since_ms: 1000 });
+    expect(lost[0]).toMatchObject({ id: 'link.lost', title: 'Link too slow: data arrives late', since_ms: 1000 });
     const c = new Conditions();
     c.standing({ ...calm, slow: true });
     expect(c.standing({ ...calm, slow: true, now_ms: 2000 })[0]).toMatchObject({ id: 'ws.slow', priority: 'advisory' });

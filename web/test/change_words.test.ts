@@ -46,7 +46,7 @@ test('a change is told in sentences with their units, and what is passed is said
     }),
   );
   expect(lines).toEqual([
-    'Waypoint 1 moved by 2.50 m, passed already: not flown',
+    'Waypoint 1 moved by 2.50 m, already passed: not flown',
     'Waypoint 4 added',
     'Waypoint 5 of the flown plan removed',
     'No-fly area 1 added',
@@ -61,5 +61,5 @@ test('a change is told in sentences with their units, and what is passed is said
 });
 test('where it goes on is a number of the new plan, or the way home', () => {
   expect(next_words(difference({}))).toBe('From waypoint 3 of 6 on');
-  expect(next_words(difference({ next_waypoint: 7 }))).toBe('No waypoint is left: it goes home after this one');
+  expect(next_words(difference({ next_waypoint: 7 }))).toBe('No waypoint is left: it returns after this one');
 });

@@ -104,7 +104,7 @@ describe('the settings of a device', () => {
     expect(missing(EMPTY)).toBe('Which port?');
     expect(missing({ ...caster, mount: ' ' })).toBe('Which mount point of the caster?');
     expect(missing({ ...caster, port: '70000' })).toBe('A port number is 1 to 65535.');
-    expect(missing({ ...EMPTY, path: '/dev/x', anchors: '6a21' })).toBe('6a21 is no network id like 0x6a21.');
+    expect(missing({ ...EMPTY, path: '/dev/x', anchors: '6a21' })).toBe('6a21 is not a network id like 0x6a21.');
     expect(missing(caster)).toBe('');
   });
 });
@@ -190,7 +190,7 @@ describe('the settings of a tag of another maker', () => {
     expect(missing({ ...LINES, mapping: ' ' })).toBe('Mapping: missing. Paste the JSON object, or choose its file.');
     expect(missing({ ...LINES, mapping: '[]' })).toMatch(/^Mapping: must be a JSON object/);
     expect(missing({ ...LINES, mapping: '{\n  "tag": "/id",\n}' })).toMatch(
-      /^Mapping: no valid JSON at line 3, column 1\. /,
+      /^Mapping: not valid JSON at line 3, column 1\. /,
     );
     expect(missing({ ...LINES, mapping: 'array = "/r"\ntag = "#/id"' })).toMatch(/TOML.*as JSON.*mapping_file=/);
   });
@@ -200,7 +200,7 @@ describe('the settings of a tag of another maker', () => {
     ['no distance', { distance: undefined }, /"distance" needs a pointer and a unit \(m, cm, mm, ft\)/],
     ['a distance without a unit', { distance: '/mm' }, /"distance" needs a pointer and a unit/],
     ['a distance in inches', { distance: { pointer: '/mm', unit: 'in' } }, /"distance" needs a pointer and a unit/],
-    ['a topic on a line', { topic: 'uwb/+' }, /"topic" is of MQTT.*Take it out/],
+    ['a topic on a line', { topic: 'uwb/+' }, /"topic" is only for MQTT.*Remove it/],
     [
       '10 kB and more',
       { id_prefix: 'x'.repeat(10_000) },
@@ -222,7 +222,9 @@ describe('the settings of a tag of another maker', () => {
     expect(missing({ ...BROKER, password: 'secret' })).toMatch(/^User: missing, and a password needs a user/);
     expect(missing({ ...MODULE, mode: 'tlv' })).toMatch(/^Id of the tag: missing, and binary needs it/);
     for (const tag of ['6e01', '0x', '0x100000000', '-1'])
-      expect(missing({ ...MODULE, tag })).toBe(`Id of the tag: ${tag} is no id. Type 32 bits at most, like 0x6e01.`);
+      expect(missing({ ...MODULE, tag })).toBe(
+        `Id of the tag: ${tag} is not an id. Type 32 bits at most, like 0x6e01.`,
+      );
     expect(missing({ ...MODULE, tag: '27183' })).toBe('');
   });
   it('is asked for where the kind is: a broker at its usual port, a tag at a serial port again', () => {

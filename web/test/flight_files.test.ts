@@ -219,7 +219,7 @@ describe('a flight of somebody else', () => {
     expect(numbers('fix', 'fixed float')).toBe('words');
     const track = 't_s,lat,lon,alt,fix\n0,51,3.7,55,1\n',
       ranges = 't_s,anchor,range_m\n0,0x6a21,7\n';
-    expect(() => flight(track, ranges)).toThrow(/what the numbers of the fix class mean/);
+    expect(() => flight(track, ranges)).toThrow(/meaning of the numbers of the fix class/);
     expect(flight(track, ranges, {}, null, { fix: 'nmea' }).fixes[0]).toMatchObject({ fix: 'single' });
     expect(flight(track, ranges, {}, null, { fix: 'rtklib' }).fixes[0]).toMatchObject({ fix: 'fixed' });
   });

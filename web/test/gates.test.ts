@@ -27,7 +27,7 @@ describe('a gate is a sentence that is true as it stands', () => {
   it('in percent where it is a share, with the sign of a lower limit', () => {
     expect(gate_line(gate('side', 0.93, 0.99, false))).toBe('The mirror solution is not excluded: 93 % (limit ≥ 99 %)');
     expect(gate_line(gate('rejected', 0.0667, 0.5, true))).toBe('Few ranges are rejected: 6.7 % (limit ≤ 50 %)');
-    expect(gate_line(gate('redundancy', 12, 30, false))).toBe('Too few ranges beyond the unknowns: 12 (limit ≥ 30)');
+    expect(gate_line(gate('redundancy', 12, 30, false))).toBe('Too few ranges for the unknowns: 12 (limit ≥ 30)');
   });
   it('for every gate that the report has words for', () => {
     const report = readFileSync(new URL('../../api/formats/report_sections.cpp', import.meta.url), 'utf8'),
@@ -66,7 +66,7 @@ describe('the gates of a running estimate', () => {
       gates: [gate('goal_h95_m', 0.31, 0.2, false), { ...gate('halves', 40, 16, false), why }],
     };
     expect(why_not_done(held)).toEqual({
-      title: 'Why not done: an acceptance gate holds it back',
+      title: 'Why not done: it fails an acceptance gate',
       text: 'The two halves of the flight disagree: χ² 40.0 (limit ≤ χ² 16.0). The two halves of the flight place it 1.80 m apart.',
     });
   });

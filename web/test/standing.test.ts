@@ -139,7 +139,7 @@ describe('what a device stands for', () => {
     expect(
       standing(device({ kind: 'ntrip', state: 'open', counters: { opened: 3 } }), recent(0, { no_rtcm_bytes: 900 }))
         .what,
-    ).toContain('no RTCM 3'));
+    ).toContain('not RTCM 3'));
   it('does not repeat the address', () =>
     expect(
       standing(device({ state: 'lost', reason: 'tcp://10.0.0.9:9001: Connection reset by peer' }), recent(0)).what,

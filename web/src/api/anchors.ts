@@ -249,7 +249,7 @@ export async function calibrate(
       headers: { Prefer: 'wait=120', 'Idempotency-Key': key },
     }),
     done = calibration_of(body);
-  if (!done) throw new Error('The calibration is still running; look again in a minute.');
+  if (!done) throw new Error('The calibration is still running; try again in a minute.');
   return done;
 }
 export async function newest_calibration(mission: string): Promise<Calibration | null> {

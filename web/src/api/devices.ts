@@ -1,4 +1,4 @@
-/// Devices that this server drives, radios it heard, and the radio settings of tags.
+/// Devices of this server, radios it heard, and the radio settings of tags.
 import { idempotency_key } from './client';
 import { call, get, given, list, type Wire } from './contract';
 import type { operations, paths } from './generated/schema';

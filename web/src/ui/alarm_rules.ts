@@ -86,7 +86,7 @@ export class Conditions {
         out.push({
           id: 'link.lost',
           priority: 'critical',
-          title: s.silence_ms < 2000 ? 'Link too slow: what arrives is old' : 'Link lost: no data from anchord',
+          title: s.silence_ms < 2000 ? 'Link too slow: data arrives late' : 'Link lost: no data from anchord',
           advice: 'To act now, use the remote control. The drone continues its procedure on its own.',
           since_ms: s.now_ms - s.data_age_ms,
           acknowledged: false,
@@ -99,7 +99,7 @@ export class Conditions {
       2000,
       'advisory',
       'This page cannot keep up',
-      'It is sent less often what it shows, never older. Go nearer to the access point, or close other pages and programs.',
+      'It receives updates less often, but none that are older. Go nearer to the access point, or close other pages and programs.',
     );
     if (s.refused && s.refused.age_ms < REFUSED_MS)
       out.push({
@@ -127,7 +127,7 @@ export class Conditions {
       5000,
       'warning',
       'RTK is FLOAT',
-      'Ranges are marked and their weight falls. Hold still in open sky until FIX returns.',
+      'Ranges are marked and weighted less. Hover in open sky until FIX returns.',
     );
     hold(
       'uwb.none',

@@ -12,20 +12,20 @@ interface Words {
 const WORDS: Record<string, Words> = {
   redundancy: {
     passes: 'Number of ranges minus unknowns',
-    fails: 'Too few ranges beyond the unknowns',
+    fails: 'Too few ranges for the unknowns',
     unit: '',
     least: true,
   },
   rejected: { passes: 'Few ranges are rejected', fails: 'Too many ranges are rejected', unit: '%' },
   geometry: {
-    passes: 'The track is wide enough for its distance',
-    fails: 'The track is too narrow for its distance',
+    passes: 'The track is wide enough for the distance',
+    fails: 'The track is too narrow for the distance',
     unit: '%',
     least: true,
   },
   precision: {
-    passes: 'Largest σ is small for its distance',
-    fails: 'Largest σ is too large for its distance',
+    passes: 'Largest σ is small relative to the distance',
+    fails: 'Largest σ is too large relative to the distance',
     unit: '%',
   },
   side: {
@@ -48,7 +48,7 @@ const WORDS: Record<string, Words> = {
   },
   halves: { passes: 'The two halves of the flight agree', fails: 'The two halves of the flight disagree', unit: 'χ²' },
   flights: { passes: 'The flights agree', fails: 'The flights disagree', unit: 'χ²' },
-  moved: { passes: 'Same position as before', fails: 'It moved, or one of the answers is wrong', unit: 'χ²' },
+  moved: { passes: 'Same position as before', fails: 'It has moved, or one of the positions is wrong', unit: 'χ²' },
   bias: { passes: 'Range bias of the kit is known, σ', fails: 'Range bias of the kit is not known, σ', unit: 'm' },
   lever_arm: { passes: 'The lever arm fits the flight', fails: 'The lever arm does not fit the flight', unit: 'σ' },
   unseen_arm: {
@@ -58,20 +58,20 @@ const WORDS: Record<string, Words> = {
   },
   track_shift: {
     passes: 'No shift of the track at its gaps',
-    fails: 'A part of the track is shifted against the rest: wrong fix, or a base set up anew',
+    fails: 'A part of the track is shifted against the rest: wrong fix, or the base position changed',
     unit: 'χ²',
   },
   track: {
-    passes: 'Few positions are off the others as a whole',
-    fails: 'Too many positions are off the others as a whole: did the base move?',
+    passes: 'Few positions are shifted together against the others',
+    fails: 'Too many positions are shifted together against the others: did the base move?',
     unit: '%',
   },
   profile: {
     passes: 'The kit agrees with its other flights',
-    fails: 'The kit is not as its other flights found it',
+    fails: 'The kit disagrees with its other flights',
     unit: 'χ²',
   },
-  settled: { passes: 'The joint solution settled', fails: 'The joint solution did not settle, rounds', unit: '' },
+  settled: { passes: 'The joint solution converged', fails: 'The joint solution did not converge, rounds', unit: '' },
   target_sigma_m: {
     passes: 'Target of the flight reached, σ of the position',
     fails: 'Target of the flight not reached, σ of the position',

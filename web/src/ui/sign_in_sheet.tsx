@@ -23,7 +23,8 @@ export function SignInSheet() {
     set_busy(true);
     try {
       await sign_in(token);
-      if (me.value === null) set_problem('The token was taken, but the session was not kept: are cookies blocked?');
+      if (me.value === null)
+        set_problem('The token was accepted, but the session was not stored: are cookies blocked?');
       else {
         set_problem('');
         close_sign_in();
@@ -33,7 +34,7 @@ export function SignInSheet() {
       set_problem(
         x instanceof ApiError
           ? x.problem.status === 401
-            ? 'This token is not known, or it was revoked or has expired.'
+            ? 'This token is unknown, or it was revoked or has expired.'
             : x.message
           : String(x),
       );
@@ -76,7 +77,7 @@ export function SignInSheet() {
       ) : (
         <form onSubmit={(e) => void submit(e)}>
           <p>
-            {synced.value ? 'What you see is the last picture. ' : ''}Paste a token to go on;{' '}
+            {synced.value ? 'What you see are the last values. ' : ''}Paste a token to go on;{' '}
             <code>anchord token create</code> makes one.
           </p>
           <label class="lab" for="token">

@@ -131,13 +131,13 @@ function read(): Readings {
               <p>
                 {
                   {
-                    connecting: 'Waiting for the first answer of anchord.',
+                    connecting: 'Waiting for the first answer from anchord.',
                     live: 'Heartbeats arrive every second.',
                     late: arriving
-                      ? 'What arrives is more than 2 s old: the link is too slow.'
+                      ? 'Data arrives more than 2 s late: the link is too slow.'
                       : 'No heartbeat for more than 2 s.',
                     lost: arriving
-                      ? 'What arrives is more than 5 s old: the link is too slow for it. Go nearer to the access point, or close other pages.'
+                      ? 'Data arrives more than 5 s late: the link is too slow. Go nearer to the access point, or close other pages.'
                       : 'No heartbeat for more than 5 s. Values are the last known; the page tries again by itself.',
                   }[link.value]
                 }
@@ -164,7 +164,7 @@ function read(): Readings {
                 : 'Centimetre positions.'
               : r.fix === 'float'
                 ? 'Decimetre positions: ranges count less until FIX returns.'
-                : 'No RTK: ranges are recorded, their positions are too poor to use.'}
+                : 'No RTK: ranges are recorded, but the positions are too inaccurate to use them.'}
           </p>
           <p>
             {fixed(r.satellites, 0)} satellites, corrections {fixed(r.correction_age_s, 1)} s old, σ E, N, U{' '}

@@ -28,26 +28,26 @@ export function why_not_done(e: EstimateMsg, task = ''): { title: string; text: 
   if (e.verdict === 'ok' && DONE.has(e.status)) return null;
   if (e.status === 'gave_up')
     return {
-      title: 'Given up: the flight ended its work here without the accuracy that was wanted',
-      text: sentence(task) || 'Fly again for the anchors that lack something.',
+      title: 'Given up: the flight ended without reaching the target accuracy here',
+      text: sentence(task) || 'Fly again for the anchors that are not good enough.',
     };
   const open = e.gates.filter((g) => !g.passed),
     holding = e.verdict === 'ok' ? open.find((g) => !is_goal(g)) : undefined,
     text = holding
       ? `${sentence(gate_line(holding))} ${sentence(holding.why)}`
       : sentence(e.reason || task || (e.verdict === 'ok' && open.length ? gate_line(open[0]!) : ''));
-  if (holding) return { title: 'Why not done: an acceptance gate holds it back', text: text.trim() };
+  if (holding) return { title: 'Why not done: it fails an acceptance gate', text: text.trim() };
   // A mirror above or below is separated by height, one beside by leaving the line.
   const level =
     e.mirror?.enu_m && e.enu_m && Math.hypot(e.mirror.enu_m[0] - e.enu_m[0], e.mirror.enu_m[1] - e.enu_m[1]) < 1;
   const advice: Record<Verdict, string> = {
     ok: 'More ranges from new directions make it more accurate.',
-    weak_geometry: 'Fly where the anchor is seen from another side, and at another height.',
+    weak_geometry: 'Fly on another side of the anchor, and at another height.',
     ambiguous: level
       ? 'Fly one stretch a few metres higher or lower: that separates the two heights.'
-      : 'Leave the line flown so far: one stretch across it separates the two positions.',
-    too_few: 'Stay in reach of it for some more seconds.',
-    diverged: 'Look for reflections, or for two devices with one id.',
+      : 'Fly one stretch across the line flown so far: that separates the two positions.',
+    too_few: 'Stay in range of it for some more seconds.',
+    diverged: 'Check for reflections, or for two devices with the same id.',
   };
   return {
     title:

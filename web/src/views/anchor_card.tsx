@@ -117,7 +117,7 @@ export function Figures({ e, stale }: { e: EstimateMsg; stale: boolean }) {
           <Q v={`${fixed(sigma_h(e.cov_enu_m2), 3)}, ${fixed(sigma_v(e.cov_enu_m2), 3)}`} u="m" />
         </dd>
       </div>
-      <div title={`sqrt of the trace; the dissertation's eq. 8.5, the trace itself, is ${fixed(e.gdop_trace, 2)}`}>
+      <div title={`root of the trace; eq 8.5 of the dissertation, the trace itself, is ${fixed(e.gdop_trace, 2)}`}>
         <dt>GDOP</dt>
         <dd class={cls}>{fixed(e.gdop, 2)}</dd>
       </div>

@@ -24,10 +24,10 @@ export function AnchorResiduals({ row, mission }: { row: AnchorRow; mission: str
     if (!solve)
       return [
         [],
-        'Running estimates keep no residuals: Review and publish solves the whole flight, and then they are here.',
+        'Running estimates have no residuals: Review and publish solves the whole flight; its residuals are then shown here.',
       ];
     const rows = await residuals(solve, row);
-    return [rows, rows.length ? '' : 'The calibration kept none of this anchor.'];
+    return [rows, rows.length ? '' : 'The calibration has stored no residuals of this anchor.'];
   });
   const [attempt, set_attempt] = useState(0),
     failed = got?.of === key && got.failed;
@@ -156,7 +156,7 @@ function Weights({ rows }: { rows: readonly Residual[] }) {
   return (
     <table class="sectors" data-testid="sectors">
       <caption>
-        Where its weight comes from <span class="mut">share of all, by direction from the anchor</span>
+        Directions that determine it <span class="mut">share of the weight by direction from the anchor</span>
       </caption>
       <tbody>
         {SECTORS.map((s, i) => (

@@ -296,7 +296,7 @@ function Nothing({ live, filtered }: { live: boolean; filtered: boolean }) {
       <div class="empty small">
         <Empty cls="" loaded={synced.value && link.value !== 'lost'}>
           {current_mission.value
-            ? 'No anchor has been in range in this flight. Is the tag powered, and are anchors in reach? Live shows what arrives.'
+            ? 'No anchor has been in range in this flight. Is the tag powered, and are anchors in range? Live shows what arrives.'
             : 'No flight yet, so no anchor has a position. Fly the first one, or import one.'}
         </Empty>
         <span class="ways">

@@ -109,7 +109,7 @@ export function CompareCalibrations() {
       )}
       {problem && (
         <div class="problem" role="status">
-          <b>They could not be compared.</b> {problem}
+          <b>The calibrations could not be compared.</b> {problem}
         </div>
       )}
       {of !== '' && of === against && (
@@ -128,20 +128,20 @@ export function CompareCalibrations() {
               )
             ) : moved === 0 ? (
               <>
-                <Chip shape="ok" tone="ok" word="NONE MOVED" /> All {both.length} anchors are where the other has them,
-                as far as both are known.
+                <Chip shape="ok" tone="ok" word="NONE MOVED" /> All {both.length} anchors are at the same position in
+                both, within their covariances.
               </>
             ) : (
               <>
                 <Chip shape="bad" tone="bad" word={`${moved} OF ${both.length} MOVED`} /> Further than both covariances
-                allow (99.9 %): an anchor that was moved, or a wrong answer in one of the two.
+                allow (99.9 %): the anchor was moved, or one of the two positions is wrong.
               </>
             )}
           </p>
           {alike && (
             <div class="callout caution" data-testid="alike">
-              <b>All of them are shifted alike</b>, by {fixed(alike.size_m * 1000, 0)} mm towards{' '}
-              {bearing(alike.bearing_deg)}°: that points to another place of the base rather than to anchors that moved.
+              <b>All of them are shifted by the same amount</b>, by {fixed(alike.size_m * 1000, 0)} mm towards{' '}
+              {bearing(alike.bearing_deg)}°: probably the position of the base changed, not the anchors.
             </div>
           )}
           <div class="scroll" tabIndex={0} aria-label="Shift of each anchor">

@@ -14,7 +14,7 @@ const FIELDS: readonly (readonly [Exclude<keyof Fields, 'external_ids'>, string,
   ['floor', 'Floor', '0'],
   ['space', 'Room', 'A0.12'],
   ['asset_tag', 'Asset tag', 'as on its label'],
-  ['ifc_guid', 'IFC GUID', '22 characters of the model'],
+  ['ifc_guid', 'IFC GUID', '22 characters, from the BIM model'],
 ];
 
 /// ISO 16739 IfcGloballyUniqueId: 128 bits as 22 characters of base 64, the first of which carries two bits.
@@ -88,7 +88,7 @@ export function FacilityPanel({ anchor, changed }: { anchor: string; changed: ()
 function Shown({ fields }: { fields: Fields }) {
   const given = FIELDS.filter(([key]) => fields[key]);
   if (!given.length && !fields.external_ids.length)
-    return <p class="why">Nothing is noted: no name, room or asset tag.</p>;
+    return <p class="why">No facility data: no name, room or asset tag.</p>;
   return (
     <dl class="kv s">
       {given.map(([key, words]) => (
@@ -138,7 +138,7 @@ function Form({ anchor, known, done, close, reload, failed }: Editing) {
       if (overtaken) await reload();
       failed(
         overtaken
-          ? 'Somebody changed this anchor meanwhile; their fields are shown, and yours are kept. Look again, then save.'
+          ? 'Somebody else has changed this anchor; their values are shown, and yours are kept. Check them, then save.'
           : error_text(e),
       );
       set_busy(false);

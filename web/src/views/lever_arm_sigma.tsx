@@ -32,7 +32,7 @@ export function LeverArmSigma({ withheld, held_m, busy, solve }: Props) {
           (lever_arm_sigma_m), nobody is asked.
         </p>
       ) : (
-        <p>The accuracies hold a lever arm that was measured to {fixed(held_m, 3)} m, one sigma.</p>
+        <p>The accuracies include a lever arm measured to {fixed(held_m, 3)} m, one sigma.</p>
       )}
       <div class="one-line">
         <label for="arm-sigma">Lever arm, one sigma, m</label>

@@ -32,6 +32,6 @@ export async function plan_again(mission: string, lacking: readonly AnchorRow[])
   const proposed = plan.outline.length > 2 ? (await generate(plan)).plan.waypoints : plan.waypoints,
     made = again(plan, proposed, lacking);
   if (!made)
-    throw new Error('None of these anchors has a place yet: fly the whole plan again, nearer to where they are.');
+    throw new Error('None of these anchors has a position yet: fly the whole plan again, nearer to the anchors.');
   return made;
 }

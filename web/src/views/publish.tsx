@@ -113,7 +113,7 @@ export function Publish({ mission }: { mission: MissionMsg }) {
     void guarded('planning', async () => {
       const made = await plan_again(mission.mission, lacking);
       keep_draft(draft_key(null), made);
-      say(`A plan for ${lacking.length} anchor${lacking.length === 1 ? '' : 's'}: look at it, then save it`);
+      say(`A plan for ${lacking.length} anchor${lacking.length === 1 ? '' : 's'}: check it, then save it`);
       publish_open.value = false;
       location.hash = '#/plan';
     });
@@ -132,7 +132,7 @@ export function Publish({ mission }: { mission: MissionMsg }) {
           ? `all ranges were solved together after landing, ${date(draft.created_at)}.`
           : solves
             ? 'all stored ranges are solved again, together.'
-            : 'the newest calibration that an engineer made of it.'}{' '}
+            : 'the newest calibration by an engineer.'}{' '}
         {solves && draft?.after_landing && (
           <button class="btn small" data-testid="solve-again" disabled={busy !== ''} onClick={() => solve_again(null)}>
             Solve again
@@ -347,7 +347,7 @@ function DraftRow({
             <input
               class="reason"
               aria-label={`Why ${r.anchor} is rejected`}
-              placeholder="why, goes into the note"
+              placeholder="reason, stored in the note"
               maxLength={120}
               value={left}
               onInput={(e) => leave(e.currentTarget.value)}
@@ -369,13 +369,13 @@ function DraftRow({
         {may_override(r) &&
           (reason === undefined ? (
             <button class="btn small" onClick={() => set_reason('')}>
-              Accept all the same
+              Accept anyway
             </button>
           ) : (
             <input
               class="reason"
               aria-label={`Reason to accept ${r.anchor}`}
-              placeholder="why, for the record"
+              placeholder="reason, stored with the revision"
               maxLength={500}
               value={reason}
               onInput={(e) => set_reason(e.currentTarget.value)}

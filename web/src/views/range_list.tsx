@@ -68,11 +68,11 @@ export function RangeList({ selected }: { selected: string | null }) {
       {rows.length === 0 ? (
         <p class="why">
           {replayed.value
-            ? 'No range up to this moment.'
+            ? 'No range until this moment.'
             : lost
               ? not_loaded_words('lost')
               : running
-                ? 'No range yet. Is the tag powered, and is an anchor in reach?'
+                ? 'No range yet. Is the tag powered, and is an anchor in range?'
                 : 'The last 20 s of ranges are shown while a flight is recorded.'}
         </p>
       ) : (

@@ -49,7 +49,7 @@ export function AfterLanding({ mission }: { mission: string }) {
         </>
       ) : (
         <>
-          <b>Calibrating.</b> All ranges of the flight are solved again, together.
+          <b>Calibrating.</b> All ranges of the flight are being solved together.
         </>
       )}
     </div>

@@ -16,7 +16,7 @@ const CHANGED: Record<Area['change'], string> = {
 };
 
 function waypoint_words({ change, before, after, moved_m, passed }: Waypoint): string {
-  const late = passed ? ', passed already: not flown' : '';
+  const late = passed ? ', already passed: not flown' : '';
   switch (change) {
     case 'added':
       return `Waypoint ${after} added${late}`;
@@ -70,5 +70,5 @@ export const difference_lines = (d: PlanDifference): string[] => [
 ];
 export const next_words = (d: PlanDifference): string =>
   d.next_waypoint > d.n_waypoints
-    ? 'No waypoint is left: it goes home after this one'
+    ? 'No waypoint is left: it returns after this one'
     : `From waypoint ${d.next_waypoint} of ${d.n_waypoints} on`;

@@ -78,7 +78,7 @@ export function Checklist({
       )}
       {plans?.length === 0 ? (
         <p class="why">
-          There is no plan to fly yet.{' '}
+          There is no plan yet.{' '}
           <a class="btn small" href="#/plan" onClick={() => (checklist_open.value = false)}>
             Make one
           </a>
@@ -103,7 +103,7 @@ export function Checklist({
           </div>
         )
       )}
-      {!items && !problem && <p role="status">Asking the server.</p>}
+      {!items && !problem && <p role="status">Waiting for the server.</p>}
       {items && (
         <ul class="checklist">
           {items.map((i) => (
@@ -113,7 +113,7 @@ export function Checklist({
             <li data-testid="check-sound">
               <Mark shape="off" tone="off" />
               <span class="grow">
-                <b>Alarms make no sound yet</b>
+                <b>The sound of alarms is off</b>
                 <span class="mut block">A browser sounds only after a tap; nothing else waits for it.</span>
               </span>
               <button class="btn" onClick={toggle_sound}>
@@ -184,7 +184,7 @@ function Item({ item: i, set }: { item: ChecklistItem; set: (i: ChecklistItem, r
           >
             <input
               aria-label={`Reason to override: ${i.text}`}
-              placeholder="why, for the record"
+              placeholder="reason, stored with the flight"
               value={reason}
               maxLength={300}
               onInput={(e) => set_reason(e.currentTarget.value)}

@@ -94,7 +94,7 @@ export function FlightBar() {
               note="hold 1 s"
               onConfirm={() => void take(mission.mission, true)}
             >
-              Take it from them
+              Take control from them
             </HoldButton>
           </p>
         ) : (

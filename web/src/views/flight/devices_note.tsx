@@ -38,12 +38,12 @@ export function DevicesNote({ mission }: { mission: string }) {
   };
   return (
     <div class="callout caution" role="status" data-testid="devices-held">
-      <b>No rows from the devices.</b> {holder.name} records with them.
+      <b>No measurements from the devices.</b> {holder.name} is recording with them.
       {may('operator') && (
         <HoldButton
           testid="take-devices"
           disabled={link.value === 'lost'}
-          note={`takes them from ${holder.name}`}
+          note={`takes the devices from ${holder.name}`}
           onConfirm={() => void take()}
         >
           Take the devices

@@ -68,7 +68,7 @@ export function PlanChange({ p, undo, close }: { p: ProcedureMsg; undo: boolean;
           {failed}
         </p>
       )}
-      {!d && !failed && <p role="status">Asking the server.</p>}
+      {!d && !failed && <p role="status">Waiting for the server.</p>}
       {d && <Difference d={d} plans={shown!.plans} />}
       {problem.value && (
         <p class="problem" role="alert">
@@ -101,7 +101,7 @@ function Difference({ d, plans }: { d: PlanDifference; plans: readonly [Plan, Pl
     <>
       {d.refused.length > 0 && (
         <div class="problem" role="alert" data-testid="plan-refused">
-          <b>It cannot be flown from here. Revision {d.from_revision} flies on.</b>
+          <b>It cannot be flown from here; revision {d.from_revision} flies on.</b>
           <ul>
             {d.refused.map((r) => (
               <li key={r}>{r}</li>
@@ -117,7 +117,7 @@ function Difference({ d, plans }: { d: PlanDifference; plans: readonly [Plan, Pl
           ))}
         </ul>
       ) : (
-        <p>Nothing differs but the revision.</p>
+        <p>Only the revision number differs.</p>
       )}
       {d.notes.length > 0 && (
         <ul class="caution" data-testid="plan-notes">

@@ -94,7 +94,7 @@ export function Procedure() {
             {p.target.height_m === null ? '' : `, to ${fixed(p.target.height_m, 1)} m above ground`}
             {p.target.heading_deg === null ? '' : `, nose ${bearing(p.target.heading_deg)}°`}.
           </b>{' '}
-          The flight goes on by itself when RTK sees you there.
+          The flight continues automatically when RTK shows that you are there.
         </div>
       )}
       <NotDone p={p} />
@@ -155,11 +155,11 @@ function NotDone({ p }: { p: ProcedureMsg }) {
         {open.map((a) => (
           <li key={a.anchor}>
             <b>{a.anchor}</b> {a.why}
-            {a.at_edge && <span class="sub"> Its height lies at an end of the height search, perhaps beyond.</span>}
+            {a.at_edge && <span class="sub"> Its height is at an end of the height search, and may be beyond it.</span>}
             {a.no_lobe && (
               <span class="sub">
                 {' '}
-                The turn showed no direction to it from this distance: no height search until it is nearer.
+                The turn found no direction to it from this distance: no height search until the aircraft is nearer.
               </span>
             )}
           </li>

@@ -18,12 +18,12 @@ export const PAGES: readonly Page[] = [
     title: 'The first flight',
     group: 'Set up',
     blocks: [
-      { p: 'There are three ways to it; none needs the internet.' },
+      { p: 'There are three ways to start; none needs the internet.' },
       {
         list: [
           'Fly the demonstration: the server simulates a drone and six anchors. Positions come within a minute.',
           'Connect my devices: the tag, the receiver and the corrections, step by step, each checked while it measures.',
-          'Import a flight: a folder, tables or a .zip of a flight that was flown already.',
+          'Import a flight: a folder, tables or a .zip of a flight that has already been flown.',
         ],
       },
     ],
@@ -43,7 +43,7 @@ export const PAGES: readonly Page[] = [
           'Compare the radio of the tag with that of the anchors in range.',
         ],
       },
-      { p: 'A change opens the link of the device anew; rows of that moment are missing from the flight.' },
+      { p: 'A change reconnects the device; measurements of that moment are missing from the flight.' },
     ],
   },
   {
@@ -59,7 +59,7 @@ export const PAGES: readonly Page[] = [
       {
         steps: [
           'Fix the GNSS antenna on top, level, with a free view of the sky and its ground plane under it.',
-          'Fix the tag below or at a side, antenna upright, at least 10 cm from carbon, batteries and motors: carbon takes 10 dB and more.',
+          'Fix the tag below or at a side, antenna upright, at least 10 cm from carbon, batteries and motors: carbon attenuates by 10 dB and more.',
           'Keep the antenna of the tag 20 cm away from the antennas of video and remote control.',
           'Tie the cables so that they do not pull on either antenna.',
           'Balance the aircraft and hover once by hand.',
@@ -76,14 +76,14 @@ export const PAGES: readonly Page[] = [
       {
         p:
           'The lever arm leads from the point that the track is of (the GNSS antenna) to the antenna of the tag: forward, left, up,' +
-          ' in metres. An error of 5 cm moves every anchor by up to 5 cm, whatever else is done.',
+          ' in metres. An error of 5 cm moves every anchor by up to 5 cm, regardless of everything else.',
       },
       {
         steps: [
           'Put the aircraft level. Forward is where its nose points.',
           "Measure from the middle of the GNSS antenna's phase centre (its label gives the height above the mount) to the middle of the tag's antenna.",
           'Forward and left are positive; below the antenna is negative. Example: 12 cm ahead, 28 cm below is 0.12, 0, −0.28.',
-          'Say how well: one sigma of the forward and left part. With a tape measure 0.02 m; by eye 0.05 m; from the drawing of the mount 0.005 m.',
+          'State the accuracy: one sigma of the forward and left part. With a tape measure 0.02 m; by eye 0.05 m; from the drawing of the mount 0.005 m.',
           'Give both with the flight: tags and lever_arm_sigma_m of POST /missions or of flight.json, or in Import a flight. System, Lever arms, shows them.',
         ],
       },
@@ -104,7 +104,7 @@ export const PAGES: readonly Page[] = [
     group: 'Set up',
     blocks: [
       {
-        p: 'Anchors are as right as the base: relative to it within centimetres, on the globe only as well as its own coordinates are known.',
+        p: 'Anchors are as accurate as the base: relative to it within centimetres, globally only as well as the coordinates of the base are known.',
       },
       {
         head: ['Base', 'Absolute accuracy', 'How'],
@@ -129,7 +129,9 @@ export const PAGES: readonly Page[] = [
           'In System, Base and datum, say how the place of the base is known, in which frame and epoch. Without it no absolute accuracy is given.',
         ],
       },
-      { p: 'FLOAT is a position without whole cycles: decimetres off. Its ranges are kept and carry little weight.' },
+      {
+        p: 'FLOAT is a position without fixed ambiguities, with errors of decimetres. Its ranges are stored and weighted little.',
+      },
     ],
   },
   {
@@ -140,14 +142,14 @@ export const PAGES: readonly Page[] = [
       {
         p:
           'Tag and anchors receive each other only with the same channel, bit rate, pulse repetition frequency and preamble. System' +
-          ' compares the tag with every anchor in its reach and says what differs.',
+          ' compares the tag with every anchor in its range and shows what differs.',
       },
       {
         steps: [
           'System, Devices: Discover. Add the tag that is found.',
           'Open it: Radio shows what it is set to, and what the anchors in range are set to.',
-          'Change the tag to what the anchors have. Change anchors only when all of them can be reached: one that is left behind is lost to the others.',
-          'Apply, and wait for the check: settings that do not come back are rolled back by themselves.',
+          'Change the tag to what the anchors have. Change anchors only when all of them can be reached: one that is left out loses contact with the others.',
+          'Apply, and wait for the check: settings that cannot be verified are rolled back automatically.',
         ],
       },
       {
@@ -167,9 +169,9 @@ export const PAGES: readonly Page[] = [
       {
         steps: [
           'Drop the folder of the flight (flight.json, track.csv, ranges.csv), its two tables, or either as .zip.',
-          'Say what each column is where its name does not: time, position, distance, address of the anchor.',
-          'Name the coordinate system where positions are of a map (EPSG code or zone), and choose what heights are above where their column does not show it.',
-          'Say which point the track is of, and where the antenna of the tag is from there: forward, left, up.',
+          'Assign the columns that are not recognised by their name: time, position, distance, address of the anchor.',
+          'Give the coordinate system of map positions (EPSG code or zone), and the reference of the heights if their column does not show it.',
+          'Give the point of the aircraft that the track describes, and where the antenna of the tag is from there: forward, left, up.',
           'Import: its rows are stored, its anchors are estimated and shown in Anchors.',
         ],
       },
@@ -187,7 +189,7 @@ export const PAGES: readonly Page[] = [
           'Plan, Floor plan: choose the floor, or make one.',
           'Send the picture: PNG, JPEG, GeoTIFF, a page of a PDF, or a DXF drawing.',
           'Click three or more corners far apart and give the place of each; a fourth shows which one is wrong.',
-          'Trace finds outline and walls: say of what the walls are and accept them, or use the outline for the plan.',
+          'Trace finds outline and walls: choose the material of the walls and accept them, or use the outline for the plan.',
         ],
       },
     ],
@@ -211,7 +213,7 @@ export const PAGES: readonly Page[] = [
       {
         list: [
           'Hold stops the aircraft where it is, at one tap, always.',
-          'When the page loses the server the aircraft goes on with its procedure; its own failsafe brings it back when the server loses the aircraft.',
+          'When the page loses the server, the aircraft continues its procedure; when the server loses the aircraft, its own failsafe brings it back.',
           'Return flies home and lands; Land lands where it is.',
         ],
       },
@@ -225,7 +227,7 @@ export const PAGES: readonly Page[] = [
       {
         steps: [
           'Edit and save the plan. What is flown stays as it was; a notice says that another revision is saved.',
-          'Review the change: what differs, what is still to fly by either, and why it is refused where it is.',
+          'Review the change: what differs, the remaining flight with either revision, and why it is refused, if it is.',
           'With control, hold Fly revision for a second: it is flown from the next waypoint.',
           'Undo goes back to the revision that was flown before.',
         ],
@@ -244,8 +246,8 @@ export const PAGES: readonly Page[] = [
         steps: [
           'Live or Anchors: Review.',
           'Press an anchor to see why: gates, error budget, residuals, its place among the others, what was published before.',
-          'Reject what you do not believe, with a word why. An anchor that fails a gate goes out only with a reason.',
-          'Fly again makes a plan for the anchors that lack something.',
+          'Reject what you do not trust, with a reason. An anchor that fails a gate is published only with a reason.',
+          'Fly again makes a plan for the anchors that are not good enough.',
           'Publish: one revision, which facility tools read. The report is the page to hand over.',
         ],
       },
@@ -270,10 +272,10 @@ export const PAGES: readonly Page[] = [
       },
       {
         p:
-          'Side shows the same from the side: heights are half of the answer. Turn it with ±15°, or look along the building. The ' +
+          'Side shows the same from the side: heights matter as much as the plane. Turn it with ±15°, or look along the building. The ' +
           'bar on an anchor is its 95 % interval.',
       },
-      { p: 'Procedure says which step is flown and why; Next point, where to and what it is expected to bring.' },
+      { p: 'Procedure says which step is flown and why; Next point, where to and how much it is expected to improve.' },
     ],
   },
   {
@@ -286,7 +288,7 @@ export const PAGES: readonly Page[] = [
           'Outline: tap the corners. Or carry the rover: Corner here sets one at its place, Walk it takes the whole outline while you go round once.',
           'Fence: what the aircraft never leaves. No-fly: what it never enters.',
           'Generate proposes a flight; every point can be moved, by finger, arrows or numbers.',
-          'Expected of anchors inside shows what the flight would bring, before it is flown.',
+          'Expected of anchors inside shows the accuracy of the flight before it is flown.',
           'Save. What is flown is the saved revision.',
         ],
       },
@@ -303,8 +305,8 @@ export const PAGES: readonly Page[] = [
       { p: 'Somebody else saved this plan while it was open here. Both versions are shown, drawn to one scale.' },
       {
         list: [
-          'Take theirs: what was drawn here since is given up.',
-          'Keep mine, then save: theirs is replaced.',
+          'Take theirs: your changes are discarded.',
+          'Keep mine, then save: their version is replaced.',
           'Decide later: nothing is saved; the next saving asks again.',
         ],
       },
@@ -319,7 +321,7 @@ export const PAGES: readonly Page[] = [
       {
         list: [
           'σ is one sigma; ± and ellipses are 95 %.',
-          'Relative is against the base; absolute adds how well the base itself is known.',
+          'Relative is relative to the base; absolute includes the uncertainty of the base itself.',
           'Acceptance gates: each with its value and limit. One that fails withholds the anchor.',
           'Residuals: how far each range is from the solution. A curve over bearing is a lever arm or a wall.',
         ],
@@ -335,8 +337,8 @@ export const PAGES: readonly Page[] = [
       {
         list: [
           'MOVED: further than both covariances allow (99.9 %). The anchor was moved, or one of the two is wrong.',
-          'All of them shifted alike: the base had another place, the anchors did not move.',
-          'NOT COMPARABLE: one of the two gives no position of it.',
+          'All of them shifted by the same amount: the position of the base changed, the anchors did not move.',
+          'NOT COMPARABLE: one of the two has no position of it.',
         ],
       },
     ],
@@ -382,9 +384,9 @@ export const PAGES: readonly Page[] = [
       },
       {
         list: [
-          'False positives, a wall taken for line of sight, are worst: they are printed large.',
-          'Test data must be of other places than training data; shared ones are called a leak.',
-          'Promote takes effect with the next range. Roll back is one press.',
+          'False positives, a wall taken for line of sight, are the worst errors: they are shown large.',
+          'Test data must come from other places than training data; shared places are called a leak.',
+          'Promote takes effect with the next range. Roll back needs one press.',
         ],
       },
     ],
@@ -422,7 +424,7 @@ export const PAGES: readonly Page[] = [
     group: 'Screens',
     blocks: [
       {
-        p: 'Devices with what each stands for and what to do; radio settings; base and datum; lever arms; clocks; flights and their bin; access.',
+        p: 'Devices with their state and what to do; radio settings; base and datum; lever arms; clocks; flights and their bin; access.',
       },
       { p: 'A device that is LATE or LOST names its reason: power, cable, port, settings.' },
     ],
@@ -480,7 +482,7 @@ export const PAGES: readonly Page[] = [
     group: 'When something is missing',
     blocks: [
       {
-        p: 'Withheld means: measured, and not good enough to be published. Its reason is in the review and in its detail.',
+        p: 'Withheld means: measured, but not good enough to be published. Its reason is in the review and in its detail.',
       },
       {
         head: ['Reason', 'Meaning', 'Do'],
@@ -502,23 +504,23 @@ export const PAGES: readonly Page[] = [
           ],
           [
             'The two halves disagree',
-            'it was moved, or the track slipped',
+            'it was moved, or the track was shifted',
             'Look at the track around that time; fly again',
           ],
           [
             'A part of the track is shifted',
-            'after a gap RTK fixed wrongly, or the base was set up anew',
+            'RTK fixed wrongly after a gap, or the base position changed',
             'Exclude the positions before or after the gap, whichever is wrong; else fly again',
           ],
           [
             'Residuals are large',
-            'walls on all ways, wrong lever arm, wrong radio',
+            'walls in all directions, wrong lever arm, wrong radio settings',
             'Check the lever arm; compare with the other anchors',
           ],
           [
             'A wrong lever arm would not show',
             'the aircraft kept one heading, or the track has none',
-            'Fly 20 s or more with the heading a quarter turn away; or say how well the arm was measured, with the flight or in Review',
+            'Fly 20 s or more with the heading a quarter turn away; or state how well the lever arm was measured, with the flight or in Review',
           ],
           [
             'Not converged in time',
@@ -547,7 +549,7 @@ export const PAGES: readonly Page[] = [
           ['NO FIX or SINGLE', 'Free view of the sky; corrections arriving? System, Devices: NTRIP'],
           ['FLOAT for minutes', 'Wait with the antenna still; base further than 20 km? Metal near the antenna?'],
           ['Estimates do not come', 'Positions must arrive too: a range waits for the position after it'],
-          ['LINK LOST', 'Wi-Fi of this device. The aircraft goes on by itself; use the remote control if in doubt'],
+          ['LINK LOST', 'Wi-Fi of this device. The aircraft continues by itself; use the remote control if in doubt'],
         ],
       },
     ],

@@ -134,7 +134,7 @@ export function CampaignMode({
         <div class="takebar">
           {take ? (
             <button type="button" class="btn big" data-testid="take-stop" onClick={stop}>
-              Stop, keep nothing
+              Stop and discard
             </button>
           ) : (
             <button
@@ -166,7 +166,7 @@ export function CampaignMode({
       </form>
       {problem && (
         <div class="problem" role="status">
-          <b>Nothing was kept.</b> {problem}
+          <b>Nothing was stored.</b> {problem}
         </div>
       )}
       {settings.length > 0 && <Taken settings={settings} />}

@@ -86,7 +86,7 @@ export function ImpulsePanel({
               )
             }
           >
-            {is_kept ? 'Kept beside' : 'Keep beside'}
+            {is_kept ? 'Kept for comparison' : 'Keep for comparison'}
           </button>
         )}
         {kept.length > 0 && (
@@ -112,7 +112,7 @@ export function ImpulsePanel({
             {problem ||
               (sample.has_cir
                 ? 'Loading the impulse response.'
-                : 'No impulse response was kept with this measurement.')}
+                : 'No impulse response was stored with this measurement.')}
           </p>
         )}
         <Features sample={sample} all={all} response={response} />
@@ -135,7 +135,7 @@ function Features({ sample, all, response }: { sample: Sample; all: readonly Sam
     const kind = all.filter((s) => s.los === los && s.features[name] !== undefined).map((s) => s.features[name]!);
     return fixed(percentile(kind, sample.features[name]!), 0);
   };
-  if (!names.length && !marks) return <p class="why">The radio gave no diagnostics with it.</p>;
+  if (!names.length && !marks) return <p class="why">The radio reported no diagnostics with it.</p>;
   const plain = (cls: string, name: string, value: string) => (
     <tr>
       <th scope="row">

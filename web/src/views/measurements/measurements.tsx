@@ -69,7 +69,7 @@ export function Measurements() {
         {source && !current && !problem && <NotLoaded cls="pad" />}
         {current && n_known === 0 && !at_end(rows) && rows.sizes.length > 0 && !problem && (
           <p class="pad" role="status">
-            Looking further: none in the first {grouped(rows.sizes.length * SCANNED)}.
+            Searching further: none in the first {grouped(rows.sizes.length * SCANNED)}.
           </p>
         )}
         {current && at_end(rows) && n_known === 0 && (
@@ -77,7 +77,7 @@ export function Measurements() {
             <p>
               {everything(filter)
                 ? `${source!.name} has no measurements.`
-                : 'Nothing passes this filter. Show all takes it away.'}
+                : 'No measurement passes this filter. Show all removes it.'}
             </p>
           </div>
         )}
@@ -100,7 +100,7 @@ export function Measurements() {
             </div>
             {current!.every > 1 && (
               <p class="sub thinned" data-testid="thinned">
-                The plots are made of {grouped(drawn.length)} of them, about one in {grouped(current!.every)}.
+                The plots show {grouped(drawn.length)} of them, about one in {grouped(current!.every)}.
               </p>
             )}
           </>

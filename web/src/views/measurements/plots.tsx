@@ -222,7 +222,7 @@ export function TruthPanel({
         )}
       </div>
       <p class="sub">
-        measured less true distance, where the truth is known{offered.length > 1 ? '' : `, against ${words}`}
+        measured minus true distance, if the truth is known{offered.length > 1 ? '' : `, against ${words}`}
       </p>
       <Scatter
         samples={true_ones}
@@ -266,7 +266,7 @@ export function HistogramPanel({ samples }: { samples: readonly Sample[] }) {
         <p class="why">
           {names.length
             ? 'Every measurement shown has the same value.'
-            : 'The radio gave no diagnostics with these measurements.'}
+            : 'The radio reported no diagnostics with these measurements.'}
         </p>
       )}
       {bars && (

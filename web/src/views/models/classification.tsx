@@ -74,11 +74,11 @@ export function ConfusionPanel({
             <Chip
               shape={fpr <= max_fpr ? 'ok' : 'bad'}
               tone={fpr <= max_fpr ? 'ok' : 'bad'}
-              word={`ASKED ≤ ${fixed(max_fpr * 100, 0)} %`}
+              word={`LIMIT ≤ ${fixed(max_fpr * 100, 0)} %`}
             />
           )}
           <br />
-          NLOS called LOS: the worst error, since its range enters with full weight.
+          NLOS classified as LOS: the worst error, because its range is used with full weight.
         </p>
       </div>
     </section>
@@ -108,7 +108,7 @@ export function ThresholdPanel({ roc, los, nlos }: { roc: Roc; los: number; nlos
         cls="roc"
         label={
           `ROC curve, area ${fixed(roc.auc, 3)}; at threshold ${fixed(threshold, 2)} ${fixed(at.tpr * 100, 1)} % of ` +
-          `LOS kept and ${fixed(at.fpr * 100, 1)} % of NLOS called LOS`
+          `LOS kept and ${fixed(at.fpr * 100, 1)} % of NLOS classified as LOS`
         }
         draw={(w, h) => {
           const f = { w, h, left: 44, right: 10, top: 8, bottom: 22 },

@@ -167,7 +167,7 @@ function Sides({ sides, bias }: { sides: readonly Side[]; bias: boolean }) {
     <>
       {!one_set && (
         <p class="why">
-          Not trained on one data set: these figures are of different measurements, and a difference may be theirs.
+          Not trained on the same data set: the figures are from different measurements, which may explain a difference.
         </p>
       )}
       <div class="cdfbox">

@@ -10,7 +10,7 @@ export function ImportancePanel({ importance }: { importance: readonly Importanc
   return (
     <section class="cell-p" data-testid="importance">
       <h2>Feature importance</h2>
-      <p class="sub">{importance.length ? 'loss when permuted, ± 1 sd' : 'not asked for in this run'}</p>
+      <p class="sub">{importance.length ? 'loss when permuted, ± 1 sd' : 'not computed in this run'}</p>
       {importance.length > 0 && (
         <table class="bars">
           <caption class="sr">Loss when a feature is permuted</caption>
@@ -82,7 +82,7 @@ export function GridPanel({ grid }: { grid: readonly Candidate[] }) {
   return (
     <section class="cell-p wide" data-testid="grid">
       <h2>Grid search</h2>
-      <p class="sub">cross-validated loss of each setting, darker is better, the picked one is framed</p>
+      <p class="sub">cross-validated loss of each setting, darker is better, the selected one is framed</p>
       <div class="grids">
         {methods.map((m) => (
           <Heat key={m} method={m} all={grid.filter((c) => c.method === m)} />

@@ -254,7 +254,7 @@ function Numbers({ run, numbers }: { run: Run; numbers: RunNumbers }) {
 function Nothing() {
   return (
     <div class="empty small">
-      <p>No model has been trained for this task yet. Ranges are used as they come until one is promoted.</p>
+      <p>No model has been trained for this task yet. Ranges are used uncorrected until one is promoted.</p>
       <p class="mut">
         Record ranges with known truth first: Measure, Label in the field. An engineer then makes a data set of them and
         trains by curl; docs/cookbook.md has each step.

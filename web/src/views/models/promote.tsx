@@ -49,8 +49,7 @@ export function Promote({
         </button>
       </div>
       <p class="why">
-        It classifies and corrects every range from the next one on. Flights already solved keep what they were solved
-        with.
+        It classifies and corrects every range from the next one on. Flights that are already solved keep their models.
       </p>
       {problem && (
         <div class="problem" role="status">

@@ -64,7 +64,7 @@ export function Rules() {
   return (
     <section class="cell-p wide" data-testid="rules">
       <div class="hd">
-        <h2>Right decisions by rule</h2>
+        <h2>Correct decisions by rule</h2>
         {sets && sets.length > 0 && (
           <select aria-label="Data set" value={chosen ?? ''} onChange={(e) => set_wanted(e.currentTarget.value)}>
             {sets.map((d) => (
@@ -88,7 +88,7 @@ export function Rules() {
       {!sets && <NotLoaded failed={problem !== ''} />}
       {sets?.length === 0 && <p class="why">No data set is frozen yet.</p>}
       {shown && shown.rows.length === 0 && (
-        <p class="why">This data set has nothing a rule could use: no RSS, no impulse response, no repeated ranges.</p>
+        <p class="why">This data set has no data for a rule: no RSS, no impulse response, no repeated ranges.</p>
       )}
       {shown && shown.rows.length > 0 && (
         <table class="tbl">

@@ -110,7 +110,7 @@ export function Profile({
     <section class="sec-p" data-testid="profile">
       <div class="hd">
         <h2>Height over time</h2>
-        <span class="meta">{clock(end, true)} of flying and dwelling alone</span>
+        <span class="meta">{clock(end, true)} flying and dwelling only</span>
       </div>
       <Drawing
         cls="profile"

@@ -32,7 +32,7 @@ export function Conflict({
     >
       <div class="first">
         <span>
-          <b>Somebody else saved this plan meanwhile (revision {theirs.revision}).</b> Nothing of either is lost yet.
+          <b>Somebody else has saved this plan (revision {theirs.revision}).</b> Nothing is lost yet.
         </span>
         <span class="actions">
           <button class="btn" onClick={later}>
@@ -83,7 +83,7 @@ export function Conflict({
             ) : (
               <tr>
                 <th scope="row">Nothing</th>
-                <td colSpan={2}>both are the same but for their revision</td>
+                <td colSpan={2}>both are the same except for their revision</td>
               </tr>
             )}
           </tbody>

@@ -73,7 +73,7 @@ export function Expected({
         <h2>Expected anchors</h2>
         <span class="meta">{plan.expected.length}</span>
       </div>
-      {plan.expected.length === 0 && <p class="why">None is named: the flight measures every anchor in range.</p>}
+      {plan.expected.length === 0 && <p class="why">None is listed: the flight measures every anchor in range.</p>}
       {rows.length > 0 && (
         <table class="tbl">
           <caption class="sr">Anchors that the flight should meet</caption>

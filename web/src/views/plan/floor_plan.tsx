@@ -160,7 +160,8 @@ function NewFloor({
         />
       </label>
     );
-  if (!sites?.length) return <Empty loaded={sites !== null}>There is no site yet: an admin makes one in System.</Empty>;
+  if (!sites?.length)
+    return <Empty loaded={sites !== null}>There is no site yet: an admin creates one in System.</Empty>;
   return (
     <form
       class="facility"
@@ -186,7 +187,7 @@ function NewFloor({
       {text('level', 'Level (0 is the ground)')}
       <span class="actions">
         <button class="btn primary" data-testid="make-floor" disabled={busy}>
-          Make floor
+          Create floor
         </button>
       </span>
     </form>

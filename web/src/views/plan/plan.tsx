@@ -232,7 +232,7 @@ function Drawn({ desk, shown }: { desk: Desk; shown: Shown }) {
             class="btn"
             aria-pressed={snap}
             data-testid="snap"
-            title="To right angles and half metres"
+            title="Snap to right angles and half metres"
             onClick={() => set_snap(!snap)}
           >
             {snap ? 'Snap on' : 'Snap off'}

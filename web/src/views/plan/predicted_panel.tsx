@@ -136,7 +136,7 @@ export function PredictedPanel({ check, shown, set }: { check: Check | null; sho
           </tbody>
         </table>
       </div>
-      <p class="sub" title="The dissertation's eq 8.5 is the trace without the root: the square of this">
+      <p class="sub" title="Eq 8.5 of the dissertation is the trace without the root: the square of this">
         Median and worst of anchors assumed 5 m apart. GDOP is √trace, of the measuring points within 60 m.
       </p>
     </section>

@@ -342,8 +342,8 @@ function Then({ player }: { player: Player }) {
         <section class="sec-p" data-testid="replay-next-point">
           <h2>Next point</h2>
           <p class="why">
-            No next point is stored with a flight: its candidates are shown while it flies. What was decided is among
-            the events.
+            The candidates for the next point are shown only during a flight and are not stored. The decisions are
+            listed in the events.
           </p>
         </section>
       )}

@@ -75,9 +75,9 @@ export function FirstRun() {
               </span>
             </section>
             <section>
-              <h2>Bring a flight</h2>
+              <h2>Import a flight</h2>
               <p>
-                A folder, tables (.csv) or an archive (.zip) of a flight that was flown already. Columns with other
+                A folder, tables (.csv) or an archive (.zip) of a flight that has already been flown. Columns with other
                 names are assigned on a page.
               </p>
               <a class="btn primary" href="#/import" data-testid="import-flight">
@@ -87,7 +87,7 @@ export function FirstRun() {
           </div>
         )}
         <details>
-          <summary>The same from a shell</summary>
+          <summary>The same on the command line</summary>
           <CopyBox text="anchord simulate flight --seed 7 --out demo-flight" />
           <CopyBox text={`anchord replay demo-flight --url ${url} --speed 4`} />
           <CopyBox text="anchord import flight DIR" />

@@ -194,10 +194,10 @@ export function flight_of(
 ): Flight {
   const missing = [...missing_track(tc), ...missing_ranges(rc)];
   if (missing.length) throw new Error(`no column is chosen for ${missing.join(', ')}`);
-  if (reading.fix === null) throw new Error('what the numbers of the fix class mean is not chosen');
+  if (reading.fix === null) throw new Error('the meaning of the numbers of the fix class is not chosen');
   if (reading.crs === null) throw new Error('the coordinate system of x, y, z is not chosen');
   if (heights_matter(tc, reading.crs) && reading.heights === null)
-    throw new Error('above what the heights are is not chosen');
+    throw new Error('the reference of the heights is not chosen');
   const refused: string[] = [],
     unknown_fix = new Map<string, number>(),
     names = new Map<string, string>(),

@@ -28,7 +28,7 @@ async function found_in(files: readonly File[]): Promise<Found> {
   for (const t of texts.filter((x) => /\.(csv|tsv|txt|pos|llh)$/.test(base(x.name)) && !base(x.name).includes('truth')))
     tables.push(table_of(base(t.name), await t.read()));
   if (!tables.length)
-    throw new Error('There is no table in it: a flight is flight.json, track.csv and ranges.csv, or tables alone.');
+    throw new Error('It contains no table: a flight is flight.json, track.csv and ranges.csv, or only tables.');
   const named = (what: RegExp): Table | undefined => tables.find((t) => what.test(t.name)),
     likeliest = (of: readonly Table[], missing: (t: Table) => number): Table | undefined =>
       [...of].sort((a, b) => missing(a) - missing(b))[0],
@@ -88,8 +88,8 @@ export function Import() {
       <div>
         <h1>Import a flight</h1>
         <p class="lead">
-          A flight folder (flight.json, track.csv, ranges.csv), the two tables alone as a logger wrote them, or either
-          as .zip. The track may be a .pos file of RTKLIB, and its positions of a map. Nothing leaves this server.
+          A flight folder (flight.json, track.csv, ranges.csv), only the two tables as a logger wrote them, or either as
+          .zip. The track may be a .pos file of RTKLIB, and its positions of a map. Nothing leaves this server.
         </p>
         {!found && (
           <div
@@ -127,7 +127,7 @@ export function Import() {
         )}
         {problem && (
           <div class="problem" role="alert" data-testid="import-problem">
-            <b>That is no flight.</b> {problem}
+            <b>This is not a flight.</b> {problem}
           </div>
         )}
         {found && <Mapping found={found} back={() => set_found(null)} />}

@@ -49,7 +49,7 @@ const field_words = (f: Field | 'time of the ranges'): string =>
       : FIELD_WORDS[f as keyof typeof FIELD_WORDS].toLowerCase();
 const NEED_WORDS = {
   'tag address': 'the tag',
-  'fix numbers': 'what the numbers of the fix class mean',
+  'fix numbers': 'the meaning of the numbers of the fix class',
   degrees: 'latitude and longitude in degrees, or x and y of a map',
   crs: 'the coordinate system of x, y, z',
   heights: 'what the heights are above',
@@ -100,7 +100,7 @@ export function Mapping({ found, back }: { found: Found; back: () => void }) {
     try {
       const flight = flight_of(track, tc, ranges, rc, reading, { ...about, lever_arm_sigma_m: sigma_m }, declared);
       if (!flight.fixes.length || !flight.ranges.length)
-        throw new Error(flight.refused[0] ?? 'There is not one position and one range in it.');
+        throw new Error(flight.refused[0] ?? 'It does not contain a position and a range.');
       set_share(0);
       const [fixes, moved] = await placed(flight);
       const sent = await send_flight(flight.mission, fixes, flight.ranges, flight.names, set_share);
@@ -138,7 +138,7 @@ export function Mapping({ found, back }: { found: Found; back: () => void }) {
     >
       <p role="status">
         {track === ranges
-          ? `${ranges.name}: ${grouped(ranges.rows.length)} rows with a place each.`
+          ? `${ranges.name}: ${grouped(ranges.rows.length)} rows, each with a position.`
           : `${track.name}: ${grouped(track.rows.length)} positions. ${ranges.name}: ${grouped(ranges.rows.length)} ranges.`}{' '}
         {missing.length === 0 ? 'All columns are known.' : `Still needed: ${missing.join('; ')}.`}
       </p>
@@ -258,7 +258,7 @@ export function Mapping({ found, back }: { found: Found; back: () => void }) {
       )}
       {tc.fix === undefined && !(is_local(tc) && reading.crs === '') && (
         <p class="caution" data-testid="import-all-fixed">
-          No column says the fix class: every position counts as RTK fixed. If some were float or single, anchors are
+          No column has the fix class: every position counts as RTK fixed. If some were float or single, anchors are
           wrong and nothing shows it.
         </p>
       )}
@@ -324,11 +324,11 @@ export function Mapping({ found, back }: { found: Found; back: () => void }) {
         )}
         {about.point !== 'tag_antenna' && (
           <label>
-            <span class="lab">How well that was measured, one sigma, m</span>
+            <span class="lab">Accuracy of that measurement, one sigma, m</span>
             <input
               value={arm_sigma}
               inputMode="decimal"
-              placeholder="not said"
+              placeholder="not stated"
               aria-invalid={bad_sigma}
               data-testid="import-arm-sigma"
               onInput={(e) => set_arm_sigma(e.currentTarget.value)}

@@ -50,7 +50,8 @@ export function entries_of(bytes: Uint8Array): Packed[] {
         const from = local + 30 + view.getUint16(local + 26, true) + view.getUint16(local + 28, true),
           packed = bytes.subarray(from, from + size);
         if (method === 0) return decoded(packed);
-        if (method !== 8) throw new Error(`${name} is packed by method ${method}; stored and deflate are read`);
+        if (method !== 8)
+          throw new Error(`${name} is compressed by method ${method}; only stored and deflate are supported`);
         return inflated(packed, 'deflate-raw');
       },
     });

@@ -18,7 +18,7 @@ import { date, grouped } from '../../ui/format';
 
 const ROLE_WORDS: Record<string, string> = {
   viewer: 'sees everything',
-  integrator: 'facility tools: reads and annotates anchors',
+  integrator: 'for facility tools: reads and annotates anchors',
   gateway: 'sends measurements only',
   engineer: 'trains and publishes',
   operator: 'flies',
@@ -110,7 +110,7 @@ export function AccessPanel() {
       </form>
       {secret && (
         <div class="callout caution" data-testid="secret">
-          <b>Copy it now: it is shown once.</b>
+          <b>Copy it now: it is shown only once.</b>
           <CopyBox label="Copy the token" text={secret} />
           <button class="btn small" onClick={() => set_secret('')}>
             I have it
@@ -153,7 +153,7 @@ export function AccessPanel() {
       </table>
       {valid.length === 0 && (
         <Empty loaded={all !== null} failed={problem !== ''}>
-          No token is valid: only this computer without sign-in can reach the server.
+          There is no valid token: only this computer, without sign-in, can use the server.
         </Empty>
       )}
     </section>

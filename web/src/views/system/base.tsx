@@ -13,7 +13,7 @@ import { Chip, Q } from '../../ui/marks';
 const SOURCES: readonly (readonly [BaseSource, string])[] = [
   ['', 'not known'],
   ['known_point', 'a known point'],
-  ['survey_in', 'surveyed in by itself'],
+  ['survey_in', 'survey-in of the base'],
   ['network', 'a network of stations'],
 ];
 /// How far absolute positions can be trusted, in a line.
@@ -26,7 +26,7 @@ export function base_words(s: Pick<Site, 'source' | 'sigma_m' | 'frame'>): {
     return {
       tone: 'caution',
       word: 'NOT KNOWN',
-      text: 'It is not stated how the position of the base is known: anchors are right relative to it, and no absolute accuracy can be given.',
+      text: 'It is not stated how the position of the base is known: anchors are accurate relative to it, but no absolute accuracy can be given.',
     };
   if (s.source === 'survey_in')
     return {
@@ -35,7 +35,7 @@ export function base_words(s: Pick<Site, 'source' | 'sigma_m' | 'frame'>): {
       text:
         'The base averaged its own ' +
         `place${s.sigma_m === null ? ', which can be metres off' : `, good to ${accuracy(s.sigma_m)} (1σ)`}: all ` +
-        'anchors are off together by as much. Fix it on a known point or against a network to do better.',
+        'anchors are shifted by the same amount. For better accuracy, set up the base on a known point or use a network.',
     };
   return {
     tone: 'ok',
@@ -112,7 +112,7 @@ export function BasePanel() {
       {list === null && <NotLoaded failed={problem !== ''} />}
       {list?.length === 0 && (
         <p class="why">
-          No site yet, so nobody knows in which datum positions are.{' '}
+          No site yet, so the datum of the positions is not known.{' '}
           {admin ? 'Name it and say where its coordinates come from.' : 'An administrator names it.'}
         </p>
       )}
@@ -176,15 +176,15 @@ export function BasePanel() {
             )}
           </dl>
           <CopyBox
-            label="Copy the place of the base"
+            label="Copy the position of the base"
             text={`${plain(reported.lat, 9)}, ${plain(reported.lon, 9)}, ${plain(reported.h_m, 3)}`}
           />
         </>
       ) : (
         <Empty loaded={bases !== null} failed={problem !== ''}>
           {bases?.length
-            ? 'The caster has not sent its position yet (RTCM 1005 or 1006 comes every few seconds).'
-            : 'They reach the rover by its own radio, so this server does not see where the base stands. With an NTRIP device here it is known.'}
+            ? 'The caster has not sent the position of the base yet (RTCM 1005 or 1006, sent every few seconds).'
+            : 'They reach the rover by its own radio, so this server does not know the position of the base; with an NTRIP device it would.'}
         </Empty>
       )}
       {admin &&
@@ -223,7 +223,7 @@ function DatumForm({ site, done, close }: { site: Site | null; done: () => void;
       d = { frame: frame.trim(), epoch: number(epoch), source, sigma_m: mm === null ? null : mm / 1000 };
     try {
       await (site ? change_site(site.id, d) : create_site(name.trim(), d));
-      say('Kept: it goes out with every position from now on');
+      say('Saved: included in every position from now on');
       done();
     } catch (e) {
       set_problem(error_text(e));

@@ -66,7 +66,7 @@ export function connect_steps(
         ? `${rows.length} device${rows.length === 1 ? '' : 's'} set up`
         : found
           ? `${found.length} port${found.length === 1 ? '' : 's'} answered`
-          : 'Nothing was looked for yet',
+          : 'No discovery has been run yet',
       todo: found ? 'Choose each device in the list, and add it.' : 'Plug in tag and receiver, then press Discover.',
       device: null,
     },
@@ -78,7 +78,7 @@ export function connect_steps(
       done: corrected,
       what: rover
         ? `${rover.d.name}: ${fix === null ? 'no position yet' : FIX[fix]}${caster ? `; ${caster.d.name}: ${caster.s.word}` : ''}`
-        : 'Without a receiver nothing can be corrected',
+        : 'Corrections need a receiver',
       todo: corrected
         ? ''
         : caster
@@ -92,7 +92,7 @@ export function connect_steps(
       done: asked > 0 && alike === asked,
       what: asked ? `${alike} of ${asked} anchors have the settings of the tag` : 'Not compared yet',
       todo: asked
-        ? 'Open Radio: it sets all of them, verifies, and goes back where that fails.'
+        ? 'Open Radio: it sets all of them, verifies the settings, and restores the old ones if that fails.'
         : 'Open Radio, and compare with the anchors: it takes up to 15 s.',
       device: pozyx?.d.id ?? null,
     },

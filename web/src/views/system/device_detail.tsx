@@ -34,7 +34,7 @@ export function DeviceDetail({ row: { d, recent }, radios, operator, busy, run, 
           </dd>
         </div>
         <div>
-          <dt>Id of this device, stays</dt>
+          <dt>Id of this device (permanent)</dt>
           <dd>
             <code>{d.id}</code>
           </dd>
@@ -66,7 +66,7 @@ export function DeviceDetail({ row: { d, recent }, radios, operator, busy, run, 
           </dd>
         </div>
         <div>
-          <dt>Good frames</dt>
+          <dt>Valid frames</dt>
           <dd>{grouped(n.frames ?? 0)}</dd>
         </div>
         {d.clock && (
@@ -175,12 +175,12 @@ export function DeviceDetail({ row: { d, recent }, radios, operator, busy, run, 
                     await forget_device(d.id!);
                     gone();
                   },
-                  'Forgotten; what it measured stays',
+                  'Removed; its measurements stay',
                 );
               else set_sure(true);
             }}
           >
-            {sure ? 'Press again to forget it' : 'Forget'}
+            {sure ? 'Press again to remove it' : 'Remove'}
           </button>
           <button class="btn primary" disabled={busy} data-testid="edit-device" onClick={edit}>
             Edit
@@ -218,7 +218,7 @@ function Anchors({ d, radios, may_ask, run }: { d: Device; radios: readonly Devi
     );
   return (
     <div data-testid="reach">
-      <h3>{seen ? `${seen.length} in its reach now` : 'Anchors'}</h3>
+      <h3>{seen ? `${seen.length} in its range now` : 'Anchors'}</h3>
       <p class="mut">{known.length ? 'Press one: its lights blink.' : 'None is known yet.'}</p>
       <div class="ids">
         {known.map((id) => (
@@ -234,7 +234,7 @@ function Anchors({ d, radios, may_ask, run }: { d: Device; radios: readonly Devi
         ))}
       </div>
       <button class="btn small" disabled={!may_ask} data-testid="look-around" onClick={look}>
-        Look around
+        Search
       </button>
     </div>
   );

@@ -56,7 +56,7 @@ export function DeviceForm({
         if (patch) await edit_device(device.id!, etag, patch);
       }
       forget();
-      say(device ? 'Changed; its link is being opened anew' : 'Set up; its link is being opened');
+      say(device ? 'Changed; its link is being opened again' : 'Set up; its link is being opened');
       done();
     } catch (e) {
       const at_field = rejected_of(e, s.kind);
@@ -292,7 +292,7 @@ function Tag({ s, change }: { s: Setup; change: Change }) {
         </select>
       </label>
       <label>
-        <span class="lab">Between anchors, a range each s</span>
+        <span class="lab">Seconds between ranges from anchor to anchor</span>
         <input
           value={s.anchor_anchor_s}
           inputMode="decimal"
@@ -338,7 +338,7 @@ function Caster({ s, change }: { s: Setup; change: Change }) {
       </label>
       <label class="tick">
         <input type="checkbox" checked={s.send_gga} onChange={(e) => change({ send_gga: e.currentTarget.checked })} />{' '}
-        Send it the position of the rover
+        Send the position of the rover to the caster
       </label>
     </>
   );

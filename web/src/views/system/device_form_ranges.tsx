@@ -56,7 +56,7 @@ export function Module({ s, change, rejected }: Part) {
         />
       </label>
       <Faults rejected={rejected} field="tag" />
-      {s.mode === 'tlv' && <p class="mut hint">Power the module up anew if its shell was used before.</p>}
+      {s.mode === 'tlv' && <p class="mut hint">Switch the module off and on if its shell was used before.</p>}
     </>
   );
 }
@@ -114,7 +114,7 @@ export function Broker({ s, change, rejected }: Part) {
       <p class="mut hint">
         MQTT 3.1.1 over plain TCP, without TLS: user and password can be read on the way. For a broker with TLS, let a
         Mosquitto on this server's computer bridge to it, and give that one's address.
-        {s.payload === 'pozyx' && ' No ranges are stored of positions; they are for comparison.'}
+        {s.payload === 'pozyx' && ' From positions no ranges are stored; they are only for comparison.'}
       </p>
       {s.payload === 'mapping' && <MappingField s={s} change={change} rejected={rejected} />}
     </>
@@ -148,7 +148,7 @@ function MappingField({ s, change, rejected }: Part) {
   return (
     <div class="mapping">
       <label>
-        <span class="lab">Mapping: where in a message each value is, and in which unit (JSON)</span>
+        <span class="lab">Mapping: place and unit of each value in a message (JSON)</span>
         <textarea
           rows={8}
           value={s.mapping}

@@ -33,7 +33,7 @@ function syntax_fault(text: string): string {
     JSON.parse(text);
     return 'Mapping: must be a JSON object. Paste all of it, from { to }.';
   } catch (e) {
-    return `Mapping: no valid JSON${place_of(text, String(e))}. Correct it there: names in double quotes, a comma between members, none at the end.`;
+    return `Mapping: not valid JSON${place_of(text, String(e))}. Correct it there: names in double quotes, a comma between members, none at the end.`;
   }
 }
 
@@ -61,7 +61,8 @@ export function mapping_fault(text: string, topic: string | null): string {
   const unit = obj(mapping.distance)?.unit;
   if (typeof unit !== 'string' || !LENGTHS.includes(unit))
     return `Mapping: "distance" needs a pointer and a unit (${LENGTHS.join(', ')}), like {"pointer": "/mm", "unit": "mm"}.`;
-  if (topic === null) return 'topic' in mapping ? 'Mapping: "topic" is of MQTT, and a line has none. Take it out.' : '';
+  if (topic === null)
+    return 'topic' in mapping ? 'Mapping: "topic" is only for MQTT; lines have no topic. Remove it.' : '';
   return topic.trim() || mapping.topic
     ? ''
     : 'Topic: missing. Type it, like uwb/+/ranges, or add "topic" to the mapping.';

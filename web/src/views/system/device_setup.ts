@@ -220,7 +220,7 @@ export function missing(s: Setup): string {
           .filter(Boolean)
           .find((a) => !/^0x[0-9a-fA-F]{1,8}$/.test(a))
       : undefined;
-  return id ? `${id} is no network id like 0x6a21.` : '';
+  return id ? `${id} is not a network id like 0x6a21.` : '';
 }
 
 /// Of api/devices/device_json.cpp: all options that are sent at once.
@@ -244,7 +244,7 @@ function module_fault(s: Setup): string {
     return s.mode === 'tlv' ? 'Id of the tag: missing, and binary needs it. Type it as on its label, like 0x6e01.' : '';
   return /^(?:0[xX][0-9a-fA-F]+|\d+)$/.test(id) && Number(id) < 2 ** 32
     ? ''
-    : `Id of the tag: ${id} is no id. Type 32 bits at most, like 0x6e01.`;
+    : `Id of the tag: ${id} is not an id. Type 32 bits at most, like 0x6e01.`;
 }
 
 /// What the server rejected of one field of the form; null where it is of no single one of these.

@@ -62,7 +62,7 @@ export function DevicesPanel({ guided }: { guided: boolean }) {
             disabled={busy !== ''}
             onClick={() => void run('discover', async () => set_found(await discover()), '')}
           >
-            {busy === 'discover' ? 'Listening at every port' : 'Discover'}
+            {busy === 'discover' ? 'Listening on every port' : 'Discover'}
           </button>
         )}
         {operator && (
@@ -107,8 +107,8 @@ export function DevicesPanel({ guided }: { guided: boolean }) {
       {!all && <NotLoaded failed={problem !== ''} />}
       {all && rows.length === 0 && (
         <p class="why">
-          This server drives no device itself. Measurements may still come over REST, or by importing a flight.{' '}
-          {operator ? 'Discover listens at every serial port for a Pozyx tag and an RTK rover.' : ''}
+          This server has no devices. Measurements can still be sent over REST or imported with a flight.{' '}
+          {operator ? 'Discover listens on every serial port for a Pozyx tag and an RTK rover.' : ''}
         </p>
       )}
       <RadioWarning
@@ -119,12 +119,12 @@ export function DevicesPanel({ guided }: { guided: boolean }) {
       {rows.length > 0 && (
         <div class="scrollx">
           <table class="tbl devs" data-testid="driven">
-            <caption class="sr">Devices that this server drives</caption>
+            <caption class="sr">Devices of this server</caption>
             <thead>
               <tr>
                 <th scope="col">Device</th>
                 <th scope="col">State</th>
-                <th scope="col">What it does, or what to do</th>
+                <th scope="col">State, or what to do</th>
                 <th scope="col" class="num">
                   Last seen
                 </th>

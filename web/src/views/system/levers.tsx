@@ -50,8 +50,8 @@ export function LeverPanel() {
       {none && (
         <div class="callout caution" role="status">
           <b>Not set.</b> The UWB antenna counts as being at {POINTS[flight.track_point]}. Measure from there to the UWB
-          antenna and give it with the next flight (tags of POST /missions, or the page of the import): every centimetre
-          of it is a centimetre of each anchor.
+          antenna and give it with the next flight (tags of POST /missions, or the page of the import): an error of 1 cm
+          shifts each anchor by up to 1 cm.
         </div>
       )}
       {flight && flight.tags.length > 0 && (
@@ -95,15 +95,15 @@ export function LeverPanel() {
       {flight && flight.tags.length > 0 && flight.track_point !== 'tag_antenna' && (
         <p class="why" data-testid="lever-arm-sigma">
           {flight.lever_arm_sigma_m == null
-            ? 'How well it was measured is not said (lever_arm_sigma_m of the flight): a flight of one heading is withheld for it.'
-            : `Measured to ${fixed(flight.lever_arm_sigma_m, 3)} m, one sigma, which the accuracies hold.`}
+            ? 'Its accuracy is not stated (lever_arm_sigma_m of the flight): a flight with one heading is withheld because of it.'
+            : `Measured to ${fixed(flight.lever_arm_sigma_m, 3)} m, one sigma, which the accuracies include.`}
         </p>
       )}
       {kit && (
         <dl class="kv s">
           <div>
             <dt>
-              Learned by the kit, {kit.n_flights} flight{kit.n_flights === 1 ? '' : 's'}
+              Estimated for the kit, {kit.n_flights} flight{kit.n_flights === 1 ? '' : 's'}
             </dt>
             <dd>
               antenna <Q v={fixed(arm ? arm.value * 100 : null, 1)} u="cm" /> higher ±{' '}

@@ -86,7 +86,7 @@ export function RadioPanel({
           <b>That did not work.</b> {problem}
         </div>
       )}
-      {busy === 'read' && <p role="status">Asking the tag.</p>}
+      {busy === 'read' && <p role="status">Reading from the tag.</p>}
       {radio && (
         <div class="addform">
           {CHOICES.map(([key, name, unit, values]) => (
@@ -137,7 +137,7 @@ export function RadioPanel({
               <p role="status">
                 <Mark shape="caution" tone="caution" />{' '}
                 <b>
-                  {apart.length} of {now.devices.length} anchors could not be seen to have the settings of the tag:
+                  {apart.length} of {now.devices.length} anchors could not be verified to have the settings of the tag:
                 </b>
               </p>
               <ul>
@@ -148,8 +148,8 @@ export function RadioPanel({
                 ))}
               </ul>
               <p class="mut">
-                One that does not answer is off, out of reach, or on other settings: bring the tag to those settings, or
-                the anchor to the tag by cable.
+                One that does not answer is switched off, out of range, or on other settings: bring the tag to those
+                settings, or the anchor to the tag by cable.
               </p>
             </>
           )}
@@ -183,7 +183,7 @@ export function RadioPanel({
         )}
       </div>
       {changed && busy === '' && (
-        <p class="mut">Where one device does not follow, all go back to their present settings.</p>
+        <p class="mut">If one device does not accept them, all return to their present settings.</p>
       )}
     </form>
   );

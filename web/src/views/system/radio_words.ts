@@ -48,7 +48,7 @@ export function radio_differences(tags: readonly Tuned[]): Difference[] {
       out.push({
         id: t.id,
         title: `${count(deaf.length, t).replace(/ ha(s|ve)$/, deaf.length === 1 ? ' does' : ' do')} not answer ${t.name}.`,
-        text: `${ids(deaf)}: off, out of reach, or on other radio settings.`,
+        text: `${ids(deaf)}: switched off, out of range, or on other radio settings.`,
       });
     if (t.radio && wish && KEYS.some((k) => num(wish[k]) !== null && num(wish[k]) !== t.radio![k]))
       out.push({

@@ -48,7 +48,7 @@ const DROPPED: Readonly<Record<string, string>> = {
   refused: 'the tag refused to range',
   zero_distance: 'distance 0, the value of a failed exchange',
   stale_range: 'a repeated range',
-  distance_impossible: 'a distance no radio reaches',
+  distance_impossible: 'a distance beyond the range of the radio',
   rss_impossible: 'an impossible RSS',
   not_acknowledged: 'an anchor did not accept the command',
   no_event: 'the tag did not report the end of the range',
@@ -57,7 +57,7 @@ const DROPPED: Readonly<Record<string, string>> = {
   no_reply: 'no reply on the cable',
   bad_reply: 'an unreadable reply',
   stray_line: 'an unexpected line',
-  byte_outside_any_frame: 'bytes of no message',
+  byte_outside_any_frame: 'bytes outside any message',
   other_format: 'another format than the one in use',
   no_time: 'no time yet',
   no_fix: 'no fix',
@@ -66,25 +66,25 @@ const DROPPED: Readonly<Record<string, string>> = {
   repeated_epoch: 'a repeated epoch',
   out_of_order: 'out of order',
   caster_refused: 'the caster refused',
-  no_rtcm_bytes: 'bytes that are no RTCM',
+  no_rtcm_bytes: 'bytes that are not RTCM',
   not_utf8: 'messages that are not UTF-8',
   not_json: 'messages that are not JSON',
   too_deep: 'messages that are nested too deeply',
   too_large: 'messages that are too large',
-  no_array: 'no array where the mapping says',
+  no_array: 'no array at the place in the mapping',
   too_many: 'more than 10 000 elements in a message',
-  bad_tag: 'no tag where the mapping says',
-  bad_anchor: 'no anchor where the mapping says',
-  bad_distance: 'no distance where the mapping says',
+  bad_tag: 'no tag at the place in the mapping',
+  bad_anchor: 'no anchor at the place in the mapping',
+  bad_distance: 'no distance at the place in the mapping',
   out_of_reach: 'distances below 0.05 m or above 150 m (unit of the mapping?)',
-  bad_time: 'no time where the mapping says',
+  bad_time: 'no time at the place in the mapping',
   time_off: 'times more than a minute away (clock not set, or unit of the mapping?)',
   bad_power: 'a power outside of -200 to 50 dBm',
   too_many_tags: 'more than 64 tags',
-  retained: 'messages that the broker kept from before',
+  retained: 'retained messages of the broker',
   write_refused: 'the device no longer accepts data',
   write_without_link: 'no receiver to send to',
-  port_conflict: 'the port is taken by another device here',
+  port_conflict: 'the port is used by another device of this server',
   driver_fault: 'a fault of anchord itself',
 };
 const FORMATS: Readonly<Record<string, string>> = { nmea: 'NMEA', ubx: 'UBX', erb: 'ERB', llh: 'LLH', gpsd: 'gpsd' };
@@ -141,24 +141,25 @@ function not_linked(d: Device): Standing {
     return bad(
       'PORT TWICE',
       `It is ${/the same port as device "[^"]*"/.exec(d.conflict || d.reason)![0]}: one port serves one device.`,
-      'Forget one of the two, or give this one its own port.',
+      'Remove one of the two, or give this one its own port.',
     );
   if (/busy/.test(d.reason))
     return bad(
       'PORT BUSY',
       'Another program has this port open.',
-      'Close it there (gpsd, ModemManager, a terminal); this server then takes the port by itself.',
+      'Close it there (gpsd, ModemManager, a terminal); this server then opens the port by itself.',
     );
   if (/no such device|unplugged/.test(d.reason))
     return bad(
       word === 'NEVER SEEN' ? word : 'UNPLUGGED',
       'Its port is not there.',
-      'Plug it in and switch it on: it is taken up within a ' +
+      'Plug it in and switch it on: it is connected within a ' +
         `second.${by_id ? '' : ' If the plug moved, Discover finds its new port; a name under by-id stays.'}`,
     );
   if (/rejects the user/.test(d.reason))
     return bad('REFUSED', reason, 'Edit: check the user, and send the password again.');
-  if (/no mount/.test(d.reason)) return bad('NO SUCH MOUNT', reason, 'Edit: take one of the mount points named here.');
+  if (/no mount/.test(d.reason))
+    return bad('NO SUCH MOUNT', reason, 'Edit: choose one of the mount points listed here.');
   if (/caster|mount/.test(d.reason)) return bad('REFUSED', reason, 'Check address, mount point and NTRIP version.');
   if (/refused: is the service/.test(d.reason))
     return bad(
@@ -170,14 +171,14 @@ function not_linked(d: Device): Standing {
     return bad(
       word,
       'The other side closed the connection.',
-      'It is opened again by itself. Where that repeats: another program may hold its only place.',
+      'It is opened again automatically. If this repeats, another program may be using its only connection.',
     );
   if (/no such host/.test(d.reason))
-    return bad(word, 'There is no computer of this name.', 'Check the address; a number always works.');
+    return bad(word, 'There is no computer with this name.', 'Check the address; an IP address always works.');
   if (/no answer|unreachable|timed out|No route/i.test(d.reason))
     return bad(
       word,
-      'Nobody answers at this address.',
+      'There is no answer at this address.',
       'Check power, cable or Wi-Fi of the device, and that it is on this network.',
     );
   if (/no Pozyx tag answers/.test(d.reason))
@@ -185,7 +186,7 @@ function not_linked(d: Device): Standing {
       ? silent(d)
       : bad(
           'NO POZYX',
-          'The port is open, but no Pozyx answers on it.',
+          'The port is open, but no Pozyx tag answers on it.',
           'Another device may be in this port: Discover shows which one answers.',
         );
   if (/received for too long/.test(d.reason)) return silent(d);
@@ -195,36 +196,34 @@ function silent(d: Device, noise = /make no frame/.test(d.reason)): Standing {
   if (d.kind === 'pozyx')
     return bad(
       'SILENT',
-      noise ? 'The cable is open, but what comes cannot be read.' : 'The cable is open, but the tag sends nothing.',
+      noise ? 'The port is open, but the data cannot be read.' : 'The port is open, but the tag sends nothing.',
       noise
-        ? 'Is this port a Pozyx at all? Discover shows it. If it is: unplug it and plug it in again, then try another cable.'
+        ? 'Is a Pozyx tag on this port? Discover shows it. If it is: unplug it and plug it in again, then try another cable.'
         : 'Unplug the tag and plug it in again. If it stays silent: another cable, another port.',
     );
   if (d.kind === 'ntrip')
     return bad(
       'SILENT',
+      noise ? 'The caster sends data, but it is not RTCM 3.' : 'The caster is connected, but sends no corrections.',
       noise
-        ? 'Bytes come from the caster, but they are no RTCM 3.'
-        : 'The caster is connected, but sends no corrections.',
-      noise
-        ? 'Edit: take a mount point that gives RTCM 3.'
+        ? 'Edit: choose a mount point that sends RTCM 3.'
         : 'Check the mount point; some casters want to know where the rover is (Edit).',
     );
   if (d.kind === 'mqtt' || d.kind === 'ndjson')
     return bad(
       'SILENT',
-      noise ? 'Messages come, but none of them can be used.' : 'The link is open, but no message comes.',
+      noise ? 'Messages are received, but none of them can be used.' : 'The link is open, but no message is received.',
       noise
         ? 'Details shows why messages are rejected: correct the mapping.'
         : d.kind === 'mqtt'
           ? 'Check that the broker runs.'
-          : 'Check that the tag sends, and that each line ends.',
+          : 'Check that the tag sends, and that each line has a line end.',
     );
   return bad(
     'SILENT',
-    noise ? 'Bytes come, but none of them can be read.' : 'The link is open, but the receiver sends nothing.',
+    noise ? 'Data is received, but cannot be read.' : 'The link is open, but the receiver sends nothing.',
     noise
-      ? 'Edit: the baud rate, or the format, is another one.'
+      ? 'Edit: check the baud rate and the format.'
       : 'Switch its output on (position, NMEA or UBX) in the receiver, or check its baud rate.',
   );
 }
@@ -234,12 +233,12 @@ const LOW_FIX: Readonly<Record<string, readonly [Tone, string, string]>> = {
   dgps: [
     'caution',
     'DGPS',
-    'Corrections come, but not those of RTK: check what the base sends (RTCM 3 with carrier phase).',
+    'Corrections are received, but not for RTK: check what the base sends (RTCM 3 with carrier phase).',
   ],
   float: [
     'caution',
     'FLOAT',
-    'Wait for the fix with a free sky. It stays float where the base is far or its corrections are old.',
+    'Wait for the fix under open sky. It stays float if the base is far away or its corrections are old.',
   ],
 };
 /// Ranges of another system; a position stream makes no rows.
@@ -255,9 +254,7 @@ function delivering(d: Device, recent: Lately): Standing {
   if (d.kind === 'dwm1001' && known && recent.rows === 0)
     return bad(
       'NO RANGES',
-      first
-        ? `The module answers, but not with ranges: ${dropped_words(first[0])}.`
-        : 'The module measures to no anchor.',
+      first ? `The module answers, but not with ranges: ${dropped_words(first[0])}.` : 'The module measures no anchor.',
       'Switch its anchors on; they must be in its network (panid).',
     );
   if (by_mapping(d)) {
@@ -265,7 +262,7 @@ function delivering(d: Device, recent: Lately): Standing {
     if (known && recent.rows === 0)
       return bad(
         'NO RANGES',
-        first ? `No message makes a range.${why}` : 'No message comes.',
+        first ? `No message gives a range.${why}` : 'No message is received.',
         first ? 'Correct the mapping: anchord devices settings.' : 'Check that the tags send, and the topic.',
       );
     if (known && drops > recent.rows)
@@ -286,12 +283,12 @@ function delivering(d: Device, recent: Lately): Standing {
       if (!first)
         return say(
           'The tag answers, but it knows no anchor to range to.',
-          'Switch anchors on in its reach. If they are on, their radio settings differ: Radio.',
+          'Switch on anchors in its range. If they are on, their radio settings differ: Radio.',
         );
       if (first[0] === 'no_answer')
         return say(
-          `${most} exchange goes unanswered.`,
-          'Anchors switched off, out of reach, or on other radio settings: Radio compares them.',
+          `${most} exchange gets no answer.`,
+          'Anchors switched off, out of range, or on other radio settings: Radio compares them.',
         );
       if (first[0] === 'refused' || first[0] === 'no_event')
         return say(
@@ -305,7 +302,7 @@ function delivering(d: Device, recent: Lately): Standing {
         );
       if (/reply|stray/.test(first[0]))
         return say(
-          'Most of what comes over the cable is broken.',
+          'Most of the data on the cable is damaged.',
           'A bad cable or plug: change it. Keep USB away from motor wires.',
         );
       return say(
@@ -328,8 +325,8 @@ function delivering(d: Device, recent: Lately): Standing {
         fix === 'none'
           ? 'The receiver sends, but it has no position.'
           : fix === 'float'
-            ? 'The position is good to decimetres, not centimetres; ranges taken now weigh less.'
-            : 'The position is good to metres only.',
+            ? 'The position is accurate to decimetres, not centimetres; ranges measured now are weighted less.'
+            : 'The position is accurate only to metres.',
         low[2],
       );
     if (known && recent.rows === 0)
@@ -358,7 +355,7 @@ function delivering(d: Device, recent: Lately): Standing {
     if (noise_bytes(recent.dropped) > 20 * recent.span_s)
       return caution(
         'NOISY',
-        `Unreadable bytes come between its messages: ${noise_bytes(recent.dropped)} bytes in ${Math.round(recent.span_s)} s. What is whole is used.`,
+        `Unreadable bytes between its messages: ${noise_bytes(recent.dropped)} bytes in ${Math.round(recent.span_s)} s. Complete messages are used.`,
         'A loose plug, a cable beside motor wires, or two formats mixed.',
       );
   }
@@ -372,7 +369,7 @@ function delivering(d: Device, recent: Lately): Standing {
 /// `same_id_speaks`: another device here with this one's id has a link.
 export function standing(d: Device, recent: Lately, same_id_speaks = true): Standing {
   const trouble = /^not started: (.*?)(; correct its settings or remove it)?$/.exec(d.reason)?.[1];
-  if (d.enabled && trouble) return bad('NOT STARTED', sentence(trouble), 'Edit: correct its settings, or forget it.');
+  if (d.enabled && trouble) return bad('NOT STARTED', sentence(trouble), 'Edit: correct its settings, or remove it.');
   if (!d.enabled || d.state === 'off') return stand('off', 'off', 'OFF');
   const same_id = same_id_speaks && /is also device/.test(d.conflict),
     linked = d.state !== 'lost' && d.state !== 'found';
@@ -380,7 +377,7 @@ export function standing(d: Device, recent: Lately, same_id_speaks = true): Stan
     return caution(
       'ELSEWHERE',
       sentence(without_ids(d.conflict).replace('is also', 'identifies itself as')),
-      'If the tag was moved to another port: forget this one. If these are two tags: one needs another id.',
+      'If the tag was moved to another port: remove this one. If these are two tags: one needs another id.',
     );
   if (same_id)
     return bad(
@@ -404,7 +401,7 @@ export function standing(d: Device, recent: Lately, same_id_speaks = true): Stan
     return caution(
       'OPENED AGAIN',
       'Its link was lost and is open again.',
-      'Nothing readable came yet; this takes some seconds.',
+      'No readable data yet; this takes some seconds.',
     );
   if (d.state === 'open') return stand('estimating', 'info', 'OPENING', 'Waiting for the first readable bytes.');
   const now = delivering(d, recent);
@@ -412,7 +409,7 @@ export function standing(d: Device, recent: Lately, same_id_speaks = true): Stan
     return bad(
       'CLOCK WRONG',
       `Its clock runs ${Math.round(Math.abs(d.clock.drift_ppm))} ppm too ` +
-        `${d.clock.drift_ppm > 0 ? 'fast' : 'slow'}: beyond any crystal that works, so its times cannot be trusted.`,
+        `${d.clock.drift_ppm > 0 ? 'fast' : 'slow'}: more than any working crystal, so its times cannot be trusted.`,
       'Use another tag; have this one repaired.',
     );
   return now;

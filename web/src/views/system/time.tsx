@@ -61,7 +61,7 @@ function Clocks({ look: { clock, devices }, kit }: { look: Look; kit: Kit | null
     <section class="sys-p" data-testid="clocks">
       <h2>Clocks</h2>
       {!clock ? (
-        <p class="why">This server drives no devices, so it keeps no time of theirs.</p>
+        <p class="why">This server has no devices, so it has no clocks to show.</p>
       ) : (
         <>
           <div>
@@ -131,7 +131,7 @@ function Clocks({ look: { clock, devices }, kit }: { look: Look; kit: Kit | null
               ))}
               {kit && lag && (
                 <tr>
-                  <th scope="row">UWB after RTK, learned by kit {kit.kit}</th>
+                  <th scope="row">UWB after RTK, estimated for kit {kit.kit}</th>
                   <td class="num">{ms(lag.value)}</td>
                   <td class="num">–</td>
                   <td class="num">{ms(lag.sigma)}</td>
