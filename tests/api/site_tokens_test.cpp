@@ -160,24 +160,26 @@ TEST_F(SiteTokenRoutes, ListsExportsAndDocumentsHoldNothingOfAnotherSite) {
       }
     }
     for (const auto& path : paths) {
-      const auto held = [&](std::map<std::string, std::string> query) {
-        const bool names_it = !query.empty();
-        auto body = generic(text(get_as(bravo_, path, query)));
-        if (!names_it && path.find("/items/") == std::string::npos) {
-          EXPECT_EQ(betrayed(alpha_, text(get_as(bravo_, path, query))), "") << path;
-        }
+      const auto held = [&](const std::map<std::string, std::string>& query) {
+        std::string body = text(get_as(bravo_, path, query));
         // An answer may say again what it was asked.
+        const auto take_out = [&](const std::string& asked) {
+          for (auto at = body.find(asked); at != std::string::npos; at = body.find(asked))
+            body.erase(at, asked.size());
+        };
+        take_out(path);
         for (const auto& [key, value] : query)
-          while (!value.empty() && body.find(value) != std::string::npos)
-            body.erase(body.find(value), value.size());
-        EXPECT_EQ(betrayed(alpha_, path.find("/items/") == std::string::npos ? body : ""), "") << path;
+          if (value.size() > 8) take_out(value);
+        EXPECT_EQ(betrayed(alpha_, body), "") << path << (query.empty() ? "" : " " + query.begin()->first);
       };
       held({});
       for (const auto& [key, value] : of_theirs) held({{key, value}});
       for (const char* format :
            {"geojson", "json", "csv", "ndjson", "kml", "gpkg", "dxf", "ifc", "pnezd", "pozyx"})
         held({{"format", format}});
-      if (path.find("/items/") != std::string::npos) EXPECT_EQ(get_as(bravo_, path).status, 404) << path;
+      if (path.find("/items/") != std::string::npos) {
+        EXPECT_EQ(get_as(bravo_, path).status, 404) << path;
+      }
     }
   }
   EXPECT_NE(betrayed(alpha_, text(get_as(alpha_, "/api/v1/exports/anchors.csv"))), "");
