@@ -41,7 +41,7 @@ set(rows
   "drivers/sim: core/base core/types drivers/pozyx drivers/mavlink drivers/drone"
 
   "api/kit: core/base core/ports"
-  "api/scope: core/base core/types core/ports api/kit"
+  "api/scope: core/base core/ports api/kit"
   "api/stream: core/base api/kit"
   "api/wire: core/base core/types core/geo core/localize core/flight api/kit"
   "api/formats: core/base core/types core/geo core/nlos core/ml core/planning core/localize api/kit api/wire"

@@ -70,11 +70,15 @@ class ScopedCalibrations final : public CalibrationStore {
         [](const Calibration& one) { return one.id; });
   }
   Result<std::string> evidence(const CalibrationId& id) override {
-    if (!current_sites().all()) BOOST_OUTCOME_TRYV(calibration(id));
+    if (!current_sites().all()) {
+      BOOST_OUTCOME_TRYV(calibration(id));
+    }
     return all_.evidence(id);
   }
   Result<void> remove(const CalibrationId& id) override {
-    if (!current_sites().all()) BOOST_OUTCOME_TRYV(calibration(id));
+    if (!current_sites().all()) {
+      BOOST_OUTCOME_TRYV(calibration(id));
+    }
     return all_.remove(id);
   }
 

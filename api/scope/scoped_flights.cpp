@@ -24,7 +24,9 @@ class ScopedMissions final : public MissionStore {
     return all_.update(mission);
   }
   Result<Mission> finish(const MissionId& id, UtcTime now) override {
-    if (!current_sites().all()) BOOST_OUTCOME_TRYV(mission(id));
+    if (!current_sites().all()) {
+      BOOST_OUTCOME_TRYV(mission(id));
+    }
     return all_.finish(id, now);
   }
   Result<Mission> mission(const MissionId& id) override {
@@ -50,7 +52,9 @@ class ScopedBin final : public MissionBin {
     return all_.put(id, now, ran_ns, by);  // by who read the mission
   }
   Result<void> restore(const MissionId& id) override {
-    if (!current_sites().all()) BOOST_OUTCOME_TRYV(binned(id));
+    if (!current_sites().all()) {
+      BOOST_OUTCOME_TRYV(binned(id));
+    }
     return all_.restore(id);
   }
   Result<BinnedMission> binned(const MissionId& id) override {
@@ -65,7 +69,9 @@ class ScopedBin final : public MissionBin {
     return all;
   }
   Result<void> empty(const MissionId& id) override {
-    if (!current_sites().all()) BOOST_OUTCOME_TRYV(binned(id));
+    if (!current_sites().all()) {
+      BOOST_OUTCOME_TRYV(binned(id));
+    }
     return all_.empty(id);
   }
   Result<std::size_t> empty_before(std::int64_t ran_ns) override { return all_.empty_before(ran_ns); }

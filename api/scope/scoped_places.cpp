@@ -75,7 +75,9 @@ class ScopedPlans final : public PlanStore {
         limit, after, [&](auto n, const auto& from) { return all_.plans(n, from); }, k_of_sites, k_id_of);
   }
   Result<void> remove(const PlanId& id, std::uint64_t expected_version) override {
-    if (!current_sites().all()) BOOST_OUTCOME_TRYV(plan(id));
+    if (!current_sites().all()) {
+      BOOST_OUTCOME_TRYV(plan(id));
+    }
     return all_.remove(id, expected_version);
   }
   // Of the flight service, for flights that were started by who may.
@@ -114,7 +116,9 @@ class ScopedFrames final : public FrameStore {
     return all_.frames_of(site);
   }
   Result<void> remove(const FrameId& id, std::uint64_t expected_version) override {
-    if (!current_sites().all()) BOOST_OUTCOME_TRYV(frame(id));
+    if (!current_sites().all()) {
+      BOOST_OUTCOME_TRYV(frame(id));
+    }
     return all_.remove(id, expected_version);
   }
 
@@ -154,12 +158,16 @@ class ScopedPlaces final : public PlaceStore {
         k_id_of);
   }
   Result<void> remove(const BuildingId& id, std::uint64_t expected_version) override {
-    if (!current_sites().all()) BOOST_OUTCOME_TRYV(building(id));
+    if (!current_sites().all()) {
+      BOOST_OUTCOME_TRYV(building(id));
+    }
     return all_.remove(id, expected_version);
   }
 
   Result<void> insert(const Floor& floor) override {
-    if (!current_sites().all()) BOOST_OUTCOME_TRYV(building(floor.building));
+    if (!current_sites().all()) {
+      BOOST_OUTCOME_TRYV(building(floor.building));
+    }
     return all_.insert(floor);
   }
   Result<void> update(const Floor& floor, std::uint64_t expected_version) override {
@@ -191,17 +199,23 @@ class ScopedPlaces final : public PlaceStore {
         k_id_of);
   }
   Result<void> remove(const FloorId& id, std::uint64_t expected_version) override {
-    if (!current_sites().all()) BOOST_OUTCOME_TRYV(floor(id));
+    if (!current_sites().all()) {
+      BOOST_OUTCOME_TRYV(floor(id));
+    }
     return all_.remove(id, expected_version);
   }
 
   Result<void> keep(const FloorId& floor, const StoredImage& image, std::string_view bytes) override {
-    if (!current_sites().all()) BOOST_OUTCOME_TRYV(this->floor(floor));
+    if (!current_sites().all()) {
+      BOOST_OUTCOME_TRYV(this->floor(floor));
+    }
     return all_.keep(floor, image, bytes);
   }
   Result<void> keep(const FloorId& floor, const PlanTiles& tiles,
                     std::span<const PlanTile> pictures) override {
-    if (!current_sites().all()) BOOST_OUTCOME_TRYV(this->floor(floor));
+    if (!current_sites().all()) {
+      BOOST_OUTCOME_TRYV(this->floor(floor));
+    }
     return all_.keep(floor, tiles, pictures);
   }
   // Their ids are in floors alone, which were read above.

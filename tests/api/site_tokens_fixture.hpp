@@ -36,7 +36,10 @@ class SiteTokens : public AppFixture {
     std::map<std::string, std::string> query{};
     std::string type{"application/json"};
   };
-  api::Response as(const api::Principal& who, Method method, const std::string& path, const Ask& ask = {}) {
+  api::Response as(const api::Principal& who, Method method, const std::string& path) {
+    return as(who, method, path, Ask{});
+  }
+  api::Response as(const api::Principal& who, Method method, const std::string& path, const Ask& ask) {
     api::Request request;
     request.method = method;
     request.path = path;
@@ -126,10 +129,14 @@ class SiteTokens : public AppFixture {
     const auto named = as_match(out, Method::patch, "/api/v1/anchors/" + out.network_ids[0],
                                 Json{{"name", word + " lobby"}}.dump());
     EXPECT_EQ(named.status, 200) << named.body;
-    ids["exclusion"] =
-        json(as(out.who, Method::post, "/api/v1/missions/" + ids["mission"] + "/exclusions",
-                {Json{{"what", "ranges"}, {"ids", {std::stoll(ids["range"])}}, {"reason", word}}.dump()}))
-            .value("id", "");
+    const Json excluded{{"kind", "ranges"},
+                        {"anchor", out.network_ids[0]},
+                        {"since", 1'777'889'473'900'000},
+                        {"reason", word}};
+    const auto exclusion =
+        as(out.who, Method::post, "/api/v1/missions/" + ids["mission"] + "/exclusions", {excluded.dump()});
+    EXPECT_EQ(exclusion.status, 201) << exclusion.body;
+    ids["exclusion"] = json(exclusion).value("id", "");
     const auto job =
         as(out.who, Method::post, "/api/v1/calibrations", {Json{{"missions", {ids["mission"]}}}.dump()});
     EXPECT_EQ(job.status, 202) << job.body;
