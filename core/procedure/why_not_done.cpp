@@ -63,7 +63,7 @@ std::string why_not_done(const std::optional<Estimate>& estimate, std::span<cons
   if (estimate->verdict != Verdict::ok)
     return estimate->reason.empty() ? "not assessed as ok yet" : estimate->reason;
   if (const Gate* gate = holding_back(*estimate)) return gate->why;
-  return "more points wanted";
+  return estimate->reason.empty() ? "more points wanted" : estimate->reason;
 }
 
 }  // namespace anchord::procedure

@@ -47,6 +47,8 @@ TEST(WhyNotDone, NamesTheFirstCauseWithItsNumbers) {
   auto held = good();
   held.best->covariance_m2 *= 0.01;
   EXPECT_EQ(why(held), "more points wanted");
+  held.reason = "its height was taken for 8.00 m";
+  EXPECT_EQ(why(held), "its height was taken for 8.00 m");
   held.gates = {{"redundancy", 90, 30, true, ""}, {"halves", 40, 16, false, "the halves disagree"}};
   EXPECT_EQ(why(held), "the halves disagree");
 }
