@@ -157,6 +157,8 @@ Ordered flight_json(const SolvedFlight& flight) {
                     {"lever_up_m", valued(s.shared.lever_up_m)},
                     {"lever_arm_sigma_m",
                      s.shared.lever_arm_sigma_m ? number(*s.shared.lever_arm_sigma_m, 4) : Ordered(nullptr)},
+                    {"range_scale", valued(s.shared.range_scale)},
+                    {"range_scale_z", number(s.shared.range_scale_z, 2)},
                     {"bias_determined", s.shared.bias_determined},
                     {"bias_z", number(s.shared.bias_z, 2)}};
   json["shared"]["lever_up_by_antenna"] = Ordered::array();

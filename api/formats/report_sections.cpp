@@ -108,6 +108,7 @@ constexpr std::array k_gate_words{
     GateWords{"bias", "Range bias of the kit, σ", "m"},
     GateWords{"lever_arm", "The lever arm fits the flight", "σ"},
     GateWords{"unseen_arm", "Undetected error that a wrong lever arm would cause", "m"},
+    GateWords{"range_scale", "Factor on the ranges, difference from one", "%"},
     GateWords{"track_shift", "No shift of the track at its gaps", "χ²"},
     GateWords{"track", "Positions shifted together against the others", "%"},
     GateWords{"profile", "The kit agrees with its other flights", "χ²"},
@@ -121,8 +122,8 @@ GateWords words_of(std::string_view name) {
   return it == k_gate_words.end() ? GateWords{name, name, ""} : *it;
 }
 std::string gate_number(double value, double limit, const GateWords& words) {
-  const bool share = words.unit == "%";
-  return fixed(share ? 100 * value : value, share || words.unit.empty() ? 0 : limit >= 10 ? 1 : 2);
+  if (words.unit == "%") return fixed(100 * value, limit < 0.2 ? 1 : 0);
+  return fixed(value, words.unit.empty() ? 0 : limit >= 10 ? 1 : 2);
 }
 
 std::string gate_row(std::span<const ReportAnchor> anchors, const std::string& name) {

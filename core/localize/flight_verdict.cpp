@@ -9,6 +9,7 @@
 #include "core/localize/error_ellipse.hpp"
 #include "core/localize/gates.hpp"
 #include "core/localize/geometry.hpp"
+#include "core/localize/prior_conflict.hpp"
 #include "core/localize/residual.hpp"
 #include "core/localize/solver.hpp"
 #include "core/planning/gdop.hpp"
@@ -296,6 +297,7 @@ AnchorSolution verdict_of(const FlightRows& flight, const JointFit& fit, std::si
   assess_mirrors(flight, solution, mirrors_of(flight, fit, index, geometry.shape, priors, options), geometry,
                  priors);
   assess_geometric_sigma(horizontal_sigma_of(known_bias_covariance(fit, index), options), geometry, solution);
+  name_prior_conflict(priors_of(flight.anchors[index].id, options), options.dims, estimate);
   return solution;
 }
 

@@ -9,6 +9,7 @@
 #include "core/localize/flight_options.hpp"
 #include "core/localize/geometry.hpp"
 #include "core/localize/linear.hpp"
+#include "core/localize/prior_conflict.hpp"
 #include "core/localize/warm_solve.hpp"
 #include "core/planning/gdop.hpp"
 
@@ -254,6 +255,7 @@ void LiveAnchor::describe(RangeBlock& block, const Result<AnchorFit>& fit, const
     }
   }
   assess_precision(geometry, estimate_);
+  if (told != options.priors.end()) name_prior_conflict(told->second, Dims::three, estimate_);
   fill_gdop(rows, answers.best.position_m, estimate_);
 }
 

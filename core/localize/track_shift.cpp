@@ -7,8 +7,8 @@
 #include <limits>
 
 #include "core/base/median.hpp"
-#include "core/localize/error_model_likelihood.hpp"
 #include "core/localize/gates.hpp"
+#include "core/localize/weighed_row.hpp"
 #include "core/localize/widen.hpp"
 
 namespace anchord {
@@ -138,23 +138,13 @@ struct Trial {
   bool wide{true};                   ///< large residuals count less; else as in the fit, some not at all
 };
 
-/// Weight in the normal equations and the residual that goes with it; the likelihood of a model where it
-/// spoke.
-struct Weighed {
-  double weight_per_m2{}, residual_m{};
-};
-Weighed weighed(const JointRow& row, const JointLine& line, const AnchorBlock& block, double scale_m,
-                bool wide, const FlightOptions& options) {
-  if (row.error_model) {
-    const auto value = error_model_value(*row.error_model, line.residual_m, line.position_variance_m2);
-    if (!(value.information_per_m2 > 0)) return {};
-    return {value.information_per_m2 / block.kappa, value.score_per_m / value.information_per_m2};
-  }
-  const double variance_m2 =
-      scale_m * scale_m + std::max(line.position_variance_m2 - block.usual_position_variance_m2, 0.0);
-  const double sigmas = std::abs(line.residual_m) / std::sqrt(variance_m2), over = sigmas / k_wide_scales;
-  const double robust = !wide ? robust_weight(sigmas, options) : over <= 1 ? 1.0 : 1.0 / (over * over);
-  return {robust / (variance_m2 * block.kappa), line.residual_m};
+/// As in the fit, or, wide, as if no residual were an outlier: a shift makes them large.
+WeighedRow weighed(const JointRow& row, const JointLine& line, const AnchorBlock& block, double scale_m,
+                   bool wide, const FlightOptions& options) {
+  if (!wide || row.error_model) return weighed_row(row, line, block, scale_m, options);
+  const double variance_m2 = row_variance_m2(line, block, scale_m);
+  const double over = std::abs(line.residual_m) / (std::sqrt(variance_m2) * k_wide_scales);
+  return {(over <= 1 ? 1.0 : 1.0 / (over * over)) / (variance_m2 * block.kappa), line.residual_m};
 }
 
 /// One anchor: its sums by part of the track, and its normal equations with its priors.
@@ -242,10 +232,10 @@ AnchorParts ShiftTest::parts_of(std::size_t index) const {
   out.scale_m =
       sizes_m.empty() ? block.scale_m : std::max(1.4826 * upper_median(sizes_m), options.min_scale_m);
   for (const Line& line : lines) {
-    const Weighed by = weighed(*line.row, line.at, block, trial_.scales_m[index], trial_.wide, options);
+    const WeighedRow by = weighed(*line.row, line.at, block, trial_.scales_m[index], trial_.wide, options);
     Eigen::Matrix<double, k_columns, 1> columns;
     columns << line.at.by_anchor, line.at.by_shared, by.residual_m;
-    out.parts[line.part].noalias() += by.weight_per_m2 * columns * columns.transpose();
+    out.parts[line.part].noalias() += by.per_m2 * columns * columns.transpose();
   }
   for (const Sums& part : out.parts) out.all += part;
   Eigen::Matrix4d own = out.all.topLeftCorner<k_own, k_own>();

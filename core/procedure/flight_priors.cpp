@@ -19,7 +19,7 @@ FlightPriors flight_priors(const std::map<NetworkId, Priors>& priors, const EnuF
     if (of.bearing && of.turned_at_m)
       prior.bearing = {plan.wgs84_from_enu(Enu{*of.turned_at_m}), of.bearing->bearing_rad,
                        of.bearing->sigma_rad};
-    if (of.height && of.climbed_at_m && !of.height->at_edge &&
+    if (of.height && of.climbed_at_m && !of.height->at_edge && !of.height->too_narrow &&
         of.height->significance >= k_least_significance)
       prior.height = {
           plan.wgs84_from_enu(Enu{{of.climbed_at_m->x(), of.climbed_at_m->y(), of.height->height_m}}),

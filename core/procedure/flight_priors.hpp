@@ -28,8 +28,8 @@ struct FlightPrior {
 using FlightPriors = std::map<NetworkId, FlightPrior>;
 
 /// Bearings and heights concluded so far. `plan`: the frame of the engine's metres.
-/// A height whose best level lay at an end of the search, or whose peak does not stand out of the noise, is
-/// left out.
+/// A height whose best level lay at an end of the search, or whose peak does not stand out of the noise or is
+/// narrower than antennas make it, is left out.
 FlightPriors flight_priors(const std::map<NetworkId, Priors>& priors, const EnuFrame& plan);
 
 /// The same as priors in the frame of the answers. North of two frames a kilometre apart differs by a

@@ -6,8 +6,17 @@
 #include <string>
 
 namespace anchord::procedure {
+namespace {
 
-Result<HeightGuess> height_from_search(std::span<const HeightSample> samples) {
+// Level over elevation, dB per square radian: two half-wave dipoles and the way's length make 17, two patch
+// antennas of 50 degrees between their half-power points 36.
+constexpr double k_sharpest_db = 60;
+constexpr double k_sharper_sigmas = 2;
+
+}  // namespace
+
+Result<HeightGuess> height_from_search(std::span<const HeightSample> samples,
+                                       std::optional<double> distance_m) {
   constexpr double k_best_sigma_m = 0.2;  // Fig 8.5b
   if (samples.size() < 5) {
     return make_error(Errc::too_few_observations,
@@ -41,9 +50,12 @@ Result<HeightGuess> height_from_search(std::span<const HeightSample> samples) {
     const Eigen::Matrix3d cov = (m.transpose() * m).inverse() * rms * rms;
     const Eigen::Vector3d slope{0, -1 / (2 * c[2]), c[1] / (2 * c[2] * c[2])};
     const double sigma = half * std::sqrt(std::max(0.0, slope.dot(cov * slope)));
+    const double curvature_sigma = std::sqrt(std::max(cov(2, 2), 1e-12));
+    const double least_db_per_m2 = (-c[2] - k_sharper_sigmas * curvature_sigma) / (half * half);
+    const bool too_narrow = distance_m && least_db_per_m2 * *distance_m * *distance_m > k_sharpest_db;
     return HeightGuess{middle + half * peak,
                        std::clamp(sigma, k_best_sigma_m, std::max(half, k_best_sigma_m)),
-                       -c[2] / std::sqrt(std::max(cov(2, 2), 1e-12)), false};
+                       -c[2] / curvature_sigma, false, too_narrow};
   }
   const auto best = std::max_element(samples.begin(), samples.end(),
                                      [](const auto& a, const auto& b) { return a.rss_dbm < b.rss_dbm; });

@@ -46,10 +46,12 @@ void PriorBook::conclude_turn() {
 void PriorBook::conclude_height_search() {
   ++version_;
   for (auto& [anchor, priors] : priors_) {
-    if (const auto height = height_from_search(priors.heights)) {
+    const auto seen = newest_.find(anchor);
+    const bool ranged = seen != newest_.end();
+    if (const auto height = height_from_search(
+            priors.heights, ranged ? std::optional(seen->second.distance_m) : std::nullopt)) {
       priors.height = height.value();
-      if (const auto seen = newest_.find(anchor); seen != newest_.end())
-        priors.climbed_at_m = seen->second.tag_m;
+      if (ranged) priors.climbed_at_m = seen->second.tag_m;
     }
     guess(anchor, priors);
   }
@@ -66,8 +68,9 @@ std::optional<bool> PriorBook::lobe_seen(NetworkId anchor) const {
 void PriorBook::guess(NetworkId anchor, Priors& priors) {
   const auto seen = newest_.find(anchor);
   if (!priors.bearing || seen == newest_.end()) return;
-  priors.guess_m = first_guess(seen->second.tag_m, seen->second.distance_m, priors.bearing->bearing_rad,
-                               priors.height ? priors.height->height_m : default_height_m_);
+  priors.guess_m =
+      first_guess(seen->second.tag_m, seen->second.distance_m, priors.bearing->bearing_rad,
+                  priors.height && !priors.height->too_narrow ? priors.height->height_m : default_height_m_);
 }
 
 std::optional<Eigen::Vector3d> PriorBook::guess_m(NetworkId anchor) const {

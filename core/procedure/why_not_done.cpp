@@ -64,7 +64,7 @@ std::string why_not_done(const std::optional<Estimate>& estimate, std::span<cons
   if (estimate->verdict != Verdict::ok)
     return estimate->reason.empty() ? "verdict not ok yet" : estimate->reason;
   if (const Gate* gate = holding_back(*estimate)) return gate->why;
-  return "more points needed";
+  return estimate->reason.empty() ? "more points needed" : estimate->reason;
 }
 
 }  // namespace anchord::procedure

@@ -70,6 +70,14 @@ describe('the gates of a running estimate', () => {
       text: 'The two halves of the flight disagree: χ² 40.0 (limit ≤ χ² 16.0). The two halves of the flight place it 1.80 m apart.',
     });
   });
+  it('name what the ranges contradict, also of an anchor that is done', () => {
+    const reason = 'its height was taken for 8.00 m above the origin, its ranges say 5.10 m (5.8 sigma)';
+    expect(why_not_done({ ...running, gates: [], reason })!.text).toContain('8.00 m above the origin');
+    expect(why_not_done({ ...running, gates: [], status: 'converged', reason })!.text).toContain(
+      'its ranges say 5.10 m',
+    );
+    expect(why_not_done({ ...running, gates: [], status: 'converged' })).toBeNull();
+  });
   it('of a calibration decide whether it is green', () => {
     const row = (acceptable: boolean) =>
       row_of({ network_id: '0x1', quality: { verdict: 'ok', acceptable, gates: [] } }, null)!.status;

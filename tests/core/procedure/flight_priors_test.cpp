@@ -29,6 +29,8 @@ TEST(FlightPriors, MeanTheSameInAnotherFrame) {
   const auto kept = flight_priors(found, plan);
   found[k_other].height = HeightGuess{9, 1.0, 2, false};
   EXPECT_EQ(flight_priors(found, plan).size(), 1u) << "a peak of the noise";
+  found[k_other].height = HeightGuess{9, 1.0, 20, false, true};
+  EXPECT_EQ(flight_priors(found, plan).size(), 1u) << "a peak of a reflection";
   ASSERT_EQ(kept.size(), 1u) << "the best level of the other lay at the end of its search";
   const auto here = priors_in(kept, plan), there = priors_in(kept, answers);
   EXPECT_LT((here.at(k_anchor).bearing->tag_m - k_turned_at).norm(), 1e-6);

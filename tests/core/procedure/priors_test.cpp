@@ -96,6 +96,34 @@ TEST(HeightSearch, SaysWhenTheBestLiesAtTheEdge) {
   EXPECT_EQ(height_from_search(samples).error().code, Errc::too_few_observations);
 }
 
+/// Levels over height of two upright half-wave dipoles, free space, from a distance; and of a hump that
+/// passes within some decimetres.
+std::vector<HeightSample> climb(double distance_m, double hump_db, unsigned seed) {
+  std::mt19937_64 random(seed);
+  std::normal_distribution<double> noise(0, 0.5);
+  std::vector<HeightSample> out;
+  for (double h = 3.5; h <= 6.5; h += 0.1) {
+    const double up_m = h - 5.0, elevation = std::atan2(up_m, distance_m);
+    const double field = std::cos(std::numbers::pi / 2 * std::sin(elevation)) / std::cos(elevation);
+    const double rss_dbm = -80 + 40 * std::log10(field) - 20 * std::log10(std::hypot(up_m, distance_m));
+    out.push_back({h, rss_dbm + hump_db * std::exp(-0.5 * up_m * up_m / 0.64) + noise(random)});
+  }
+  return out;
+}
+
+TEST(HeightSearch, TakesAPeakThatNoAntennaMakesFromThereForNoHeight) {
+  for (unsigned seed = 0; seed < 50; ++seed) {
+    // What antennas make, near and far.
+    for (const double distance_m : {2.0, 4.0, 8.0, 15.0}) {
+      const auto peak = height_from_search(climb(distance_m, 0, seed), distance_m);
+      EXPECT_FALSE(peak.value().too_narrow) << distance_m << ' ' << seed;
+    }
+    // 8 dB within a metre, seen from 10 m.
+    EXPECT_TRUE(height_from_search(climb(10, 8, seed), 10).value().too_narrow) << seed;
+    EXPECT_FALSE(height_from_search(climb(10, 8, seed)).value().too_narrow) << "no distance, no judgement";
+  }
+}
+
 TEST(ExitRule, EndsByGoalLimitOrBatteryWithTheReason) {
   ExitRule rule;
   rule.gdop_root = 0.8;

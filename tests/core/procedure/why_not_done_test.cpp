@@ -43,10 +43,12 @@ TEST(WhyNotDone, NamesTheFirstCauseWithItsNumbers) {
   auto biased = good();
   biased.bias_sigma_m = 0.3;
   EXPECT_EQ(why(biased), "bias and position cannot be distinguished: bias known to 0.30 m");
-  EXPECT_EQ(why(good()), "accuracy 0.300 m, wanted 0.050 m");
+  EXPECT_EQ(why(good()), "accuracy 0.300 m, target 0.050 m");
   auto held = good();
   held.best->covariance_m2 *= 0.01;
   EXPECT_EQ(why(held), "more points needed");
+  held.reason = "its height was taken for 8.00 m";
+  EXPECT_EQ(why(held), "its height was taken for 8.00 m");
   held.gates = {{"redundancy", 90, 30, true, ""}, {"halves", 40, 16, false, "the halves disagree"}};
   EXPECT_EQ(why(held), "the halves disagree");
 }

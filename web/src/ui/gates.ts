@@ -56,6 +56,11 @@ const WORDS: Record<string, Words> = {
     fails: 'A wrong lever arm would not show: the aircraft turned too little, unseen error',
     unit: 'm',
   },
+  range_scale: {
+    passes: 'The ranges show no factor on their length',
+    fails: 'The ranges are too long or too short by a factor: wrong unit, clock or setting of the radios',
+    unit: '%',
+  },
   track_shift: {
     passes: 'No shift of the track at its gaps',
     fails: 'A part of the track is shifted against the rest: wrong fix, or the base position changed',

@@ -25,7 +25,11 @@ export const sentence = (text: string): string =>
 const DONE: ReadonlySet<AnchorStatus> = new Set(['converged', 'accepted', 'passes', 'within_goal', 'over_goal']);
 /// Title and sentence of "why not done"; null when there is nothing to explain. `task`: what the procedure says of it, empty where it is content.
 export function why_not_done(e: EstimateMsg, task = ''): { title: string; text: string } | null {
-  if (e.verdict === 'ok' && DONE.has(e.status)) return null;
+  // What the turn or the height search found and the ranges contradict is to be looked at, however good the position.
+  if (e.verdict === 'ok' && DONE.has(e.status))
+    return e.reason.includes('its ranges say')
+      ? { title: 'Done, but a turn or height search disagrees', text: sentence(e.reason) }
+      : null;
   if (e.status === 'gave_up')
     return {
       title: 'Given up: the flight ended without reaching the target accuracy here',

@@ -1,0 +1,117 @@
+// Ranges that are right but for a factor. Truth and ranges are made from a path in closed form: the factor
+// put in is the factor to be found.
+#include "core/localize/range_scale.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/localize/flight_solver.hpp"
+#include "tests/core/localize/flight_support.hpp"
+
+namespace anchord {
+namespace {
+
+using testing::MadeFlight;
+using testing::make_flight;
+
+MadeFlight turning(std::uint64_t seed) {
+  MadeFlight made;
+  made.turn_rate_radps = 0.2;
+  made.seed = seed;
+  return made;
+}
+
+const Gate& scale_gate(const AnchorSolution& anchor) {
+  const auto& gates = anchor.estimate.gates;
+  const auto at = std::ranges::find(gates, "range_scale", &Gate::name);
+  EXPECT_NE(at, gates.end());
+  static const Gate none;
+  return at == gates.end() ? none : *at;
+}
+
+void expect_says(const Gate& gate, const char* words) {
+  EXPECT_NE(gate.why.find(words), std::string::npos) << gate.why;
+}
+
+TEST(RangeScale, WithholdsEveryAnchorWhereAllRangesHaveAFactor) {
+  for (const double factor : {0.9, 0.97, 1.02, 1.05, 1.1}) {
+    for (const std::uint64_t seed : {1, 2}) {
+      FlightData flight = make_flight(turning(seed));
+      for (Range& range : flight.ranges) range.distance_m *= factor;
+      const FlightSolution solution = solve_flight(flight).value();
+      EXPECT_NEAR(solution.shared.range_scale.value, factor - 1, 0.005);
+      EXPECT_GT(std::abs(solution.shared.range_scale_z), 4);
+      for (const AnchorSolution& anchor : solution.anchors) {
+        const Gate& gate = scale_gate(anchor);
+        EXPECT_FALSE(gate.passed) << factor << ' ' << gate.why;
+        EXPECT_GT(gate.value.value_or(0), gate.limit);
+        expect_says(gate, factor > 1 ? "too long by a factor, all of them" : "too short by a factor");
+        expect_says(gate, "check the unit of the ranges");
+        EXPECT_FALSE(anchor.estimate.acceptable());
+      }
+    }
+  }
+}
+
+TEST(RangeScale, NamesTheAntennaWhoseRangesHaveAFactor) {
+  FlightData flight = make_flight(turning(3));
+  flight.mission.tags.push_back({NetworkId{0x6e02}, 0, {0, 0, 0}});
+  for (std::size_t i = 0; i < flight.ranges.size(); i += 2) {
+    flight.ranges[i].tag = NetworkId{0x6e02};
+    flight.ranges[i].distance_m *= 1.05;
+  }
+  for (const AnchorSolution& anchor : solve_flight(flight).value().anchors) {
+    EXPECT_FALSE(scale_gate(anchor).passed);
+    expect_says(scale_gate(anchor), "0x6e02");
+    EXPECT_FALSE(anchor.estimate.acceptable());
+  }
+}
+
+TEST(RangeScale, WithholdsTheOneAnchorWhoseRangesHaveAFactor) {
+  FlightData flight = make_flight(turning(4));
+  for (Range& range : flight.ranges)
+    if (range.anchor == NetworkId{0x6001}) range.distance_m *= 1.03;
+  for (const AnchorSolution& anchor : solve_flight(flight).value().anchors) {
+    const bool has_one = anchor.estimate.anchor == NetworkId{0x6001};
+    EXPECT_EQ(scale_gate(anchor).passed, !has_one) << scale_gate(anchor).why;
+    if (has_one) expect_says(scale_gate(anchor), "those of this anchor");
+  }
+}
+
+TEST(RangeScale, LeavesGoodFlightsAccepted) {
+  for (const std::uint64_t seed : {11, 12, 13, 14, 15, 16}) {
+    MadeFlight made = turning(seed);
+    // None of them is a factor.
+    made.bias_m = seed % 2 == 0 ? 0.5 : 0.0;
+    made.lag_s = 0.1;
+    const FlightSolution solution = solve_flight(make_flight(made)).value();
+    EXPECT_LT(std::abs(solution.shared.range_scale.value), 0.005);
+    for (const AnchorSolution& anchor : solution.anchors) {
+      EXPECT_TRUE(scale_gate(anchor).passed) << scale_gate(anchor).why;
+      EXPECT_TRUE(anchor.estimate.acceptable()) << seed;
+    }
+  }
+}
+
+// In a small hall ranges of real radios have a slope of their own: no factor is shown there.
+TEST(RangeScale, TakesNoSlopeOfNearRangesForAFactor) {
+  MadeFlight made = turning(21);
+  made.anchors = {{8, 2, 1.5}, {-7, 4, 6}, {3, -9, 2}, {-6, -5, 9}};
+  FlightData flight = make_flight(made);
+  constexpr double k_size = 0.3;
+  for (Fix& fix : flight.fixes) fix.local_m *= k_size;
+  for (Range& range : flight.ranges)
+    range.distance_m = range.distance_m * k_size + 0.05 * (std::min(range.distance_m * k_size, 5.0) - 2.5);
+  const FlightSolution solution = solve_flight(flight).value();
+  for (std::size_t i = 0; i < made.anchors.size(); ++i) {
+    EXPECT_TRUE(scale_gate(solution.anchors[i]).passed) << scale_gate(solution.anchors[i]).why;
+    const Hypothesis& best = solution.anchors[i].estimate.best.value();
+    const Eigen::Vector3d off = best.position.m - k_size * made.anchors[i];
+    EXPECT_LT(off.dot(best.covariance_m2.inverse() * off), 7.815) << i;  // 95 %, three degrees
+  }
+}
+
+}  // namespace
+}  // namespace anchord
