@@ -108,7 +108,7 @@ constexpr std::array k_gate_words{
     GateWords{"bias", "Range bias of the kit, σ", "m"},
     GateWords{"lever_arm", "The lever arm fits the flight", "σ"},
     GateWords{"unseen_arm", "Undetected error that a wrong lever arm would cause", "m"},
-    GateWords{"range_scale", "Factor on the ranges, difference from one", "%"},
+    GateWords{"range_scale", "Scale error of the ranges", "%"},
     GateWords{"track_shift", "No shift of the track at its gaps", "χ²"},
     GateWords{"track", "Positions shifted together against the others", "%"},
     GateWords{"profile", "The kit agrees with its other flights", "χ²"},

@@ -32,16 +32,16 @@ std::string prior_conflict(const AnchorPriors& priors, const Eigen::Vector3d& pl
     // Right above there is no bearing to speak of.
     if (sigmas > k_contradicted && way.norm() > 1.0)
       add(text,
-          "its bearing was taken for %.0f degrees (turn, or given), its ranges say %.0f degrees from there "
-          "(%.1f sigma): the ranges count, a wall may have turned the bearing",
+          "the bearing %.0f degrees (of a turn, or given) disagrees with the ranges, %.0f degrees from there "
+          "(%.1f sigma): the ranges are used; a reflection may have changed the bearing",
           turned_deg(b->bearing_rad), turned_deg(found_rad), sigmas);
   }
   if (const auto& h = priors.height; h && dims == Dims::three) {
     const double sigmas = std::abs(h->up_m - place_m.z()) / h->sigma_m;
     if (sigmas > k_contradicted)
       add(text,
-          "its height was taken for %.2f m above the origin (height search, or given), its ranges say %.2f m "
-          "(%.1f sigma): the ranges count, a reflection may have made the peak",
+          "the height %.2f m above the origin (of a height search, or given) disagrees with the ranges, %.2f m "
+          "(%.1f sigma): the ranges are used; the peak may be a reflection",
           h->up_m, place_m.z(), sigmas);
   }
   return text;

@@ -262,9 +262,9 @@ void find_doubts(std::vector<Answer>& answers) {
 std::string whose(const FlightRows& flight, const Group& group) {
   if (group.antenna) {
     const FlightAntenna& of = flight.antennas[*group.antenna];
-    return "those to antenna " + std::to_string(of.antenna) + " of tag " + to_string(of.tag);
+    return "to antenna " + std::to_string(of.antenna) + " of tag " + to_string(of.tag);
   }
-  return group.anchor ? "those of this anchor" : "all of them";
+  return group.anchor ? "of this anchor" : "all ranges";
 }
 
 std::string why(const FlightRows& flight, const Answer& worst) {
@@ -272,13 +272,13 @@ std::string why(const FlightRows& flight, const Answer& worst) {
   char text[400];
   if (over_limit(worst) <= 1)
     std::snprintf(text, sizeof text,
-                  "no factor on the ranges is shown: %s %+.2f %% too long with sigma %.2f %% (%.1f sigma)",
+                  "no scale error of the ranges is seen: %s %+.2f %% with sigma %.2f %% (%.1f sigma)",
                   whose(flight, worst.group).c_str(), 100 * found.value, 100 * found.sigma,
                   std::abs(found.z));
   else
     std::snprintf(
         text, sizeof text,
-        "the ranges are too %s by a factor, %s: %.4f with sigma %.4f (%.1f sigma); check the unit of "
+        "the ranges are too %s by a factor (%s): %.4f with sigma %.4f (%.1f sigma); check the unit of "
         "the ranges, the clock and the delay settings of the radios, correct the ranges and solve "
         "again",
         found.value > 0 ? "long" : "short", whose(flight, worst.group).c_str(), 1 + found.value, found.sigma,
@@ -350,8 +350,8 @@ Result<RangeScale> check_range_scale(const FlightRows& flight, const JointFit& f
   if (n_wider > 0) {
     char text[240];
     std::snprintf(text, sizeof text,
-                  "%zu of %zu anchors are less certain because their ranges may be too long or short by a "
-                  "factor: this flight knows it with sigma %.1f %%; ranges from near and far would show it",
+                  "%zu of %zu anchors are less accurate because of a possible scale error of the ranges: this "
+                  "flight determines it with sigma %.1f %% only; ranges from near and far would improve it",
                   n_wider, flight.anchors.size(), 100 * out.all.sigma);
     out.note = text;
   }

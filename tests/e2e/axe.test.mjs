@@ -1,7 +1,7 @@
-// What axe finds, in every view, every theme and every size: nothing, the sizes of targets among it. One server with something in each view.
+// What axe finds, in every view, every theme and every size: nothing, the sizes of targets among it; and that all of it can be read. One server with something in each view.
 import assert from 'node:assert/strict';
 import { after, before, test } from 'node:test';
-import { openBrowser, openPage, picture, text, violations } from './browser.mjs';
+import { openBrowser, openPage, picture, text, unreadable, violations } from './browser.mjs';
 import { fullServer, sizes, views } from './full_server.mjs';
 import { eventually } from './server.mjs';
 
@@ -31,7 +31,7 @@ async function wrong(page) {
 }
 
 for (const theme of ['light', 'dark', 'sun'])
-  test(`no view breaks a rule of axe at any size, ${theme}`, async () => {
+  test(`no view breaks a rule of axe at any size, and every word of it can be read, ${theme}`, async () => {
     const { page, id } = await openPage(browser, server, { hash: '#/live', theme }),
       found = [];
     for (const view of views) {
@@ -40,7 +40,7 @@ for (const theme of ['light', 'dark', 'sun'])
       for (const [size, width, height] of sizes) {
         await page.setViewportSize({ width, height });
         await page.evaluate(() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done))));
-        found.push(...(await wrong(page)).map((v) => `${view}, ${size}: ${v}`));
+        found.push(...[...(await wrong(page)), ...(await unreadable(page))].map((v) => `${view}, ${size}: ${v}`));
         await picture(page, `axe-${view}-${size}-${theme}`);
       }
     }

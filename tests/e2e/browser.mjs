@@ -74,6 +74,78 @@ export async function violations(page, { sizes = false, within = null } = {}) {
   return [...found.violations.map((v) => `${v.id}: ${v.nodes.map((n) => n.target.join(' ')).join(', ')}`), ...sideways];
 }
 
+/** What a reader cannot read: text broken into letters, cut off with no dots, out of its button, and controls that lie on their neighbours. */
+export const unreadable = (page) =>
+  page.evaluate(() => {
+    const found = [],
+      name = (e) => {
+        const near = e.closest('[data-testid]')?.dataset.testid ?? e.closest('[class]')?.className ?? e.tagName;
+        return `${near}: "${(e.innerText ?? e.textContent).trim().replace(/\s+/g, ' ').slice(0, 40)}"`;
+      },
+      seen = (e) =>
+        e.checkVisibility({ visibilityProperty: true }) &&
+        !e.closest('.sr, .skip, [aria-hidden="true"], option') &&
+        getComputedStyle(e).clipPath === 'none';
+    const texts = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
+    while (texts.nextNode()) {
+      const text = texts.currentNode.data.trim(),
+        e = texts.currentNode.parentElement;
+      if (text.length < 2 || !seen(e) || e.closest('script, style, select')) continue;
+      const range = document.createRange();
+      range.selectNodeContents(texts.currentNode);
+      const rects = [...range.getClientRects()].filter((r) => r.width > 0),
+        lines = new Set(rects.map((r) => Math.round(r.top))).size;
+      if (!rects.length) continue;
+      // A word stays whole, unless it is longer than a line may be, or has a place to break.
+      for (const word of lines > 1 ? texts.currentNode.data.matchAll(/[\p{L}\p{N}]{2,20}/gu) : []) {
+        range.setStart(texts.currentNode, word.index);
+        range.setEnd(texts.currentNode, word.index + word[0].length);
+        const tops = new Set([...range.getClientRects()].filter((r) => r.width > 0).map((r) => Math.round(r.top)));
+        if (tops.size > 1) found.push(`broken word ${word[0]}: ${name(e)}`);
+      }
+      const right = Math.max(...rects.map((r) => r.right)),
+        left = Math.min(...rects.map((r) => r.left));
+      for (let box = e; box && box !== document.body; box = box.parentElement) {
+        const style = getComputedStyle(box),
+          b = box.getBoundingClientRect();
+        if (/auto|scroll/.test(style.overflowX)) break;
+        const hides = /hidden|clip/.test(style.overflowX) || box.tagName === 'svg',
+          pressed = box.matches('button, .btn, .tile, .chip');
+        if ((hides || pressed) && (right > b.right + 1.5 || left < b.left - 1.5)) {
+          if (!(hides && style.textOverflow === 'ellipsis'))
+            found.push(`${hides ? 'cut off' : 'out of its button'}: ${name(e)}`);
+          else if (!box.title && !e.closest('[title]')) found.push(`shortened with no way to read it: ${name(e)}`);
+          break;
+        }
+      }
+    }
+    // No control is cut by what holds it, unless it can be scrolled to.
+    for (const e of document.querySelectorAll('button, a.btn, select, input')) {
+      const b = e.getBoundingClientRect();
+      for (let box = e.parentElement; seen(e) && box && box !== document.body; box = box.parentElement) {
+        const style = getComputedStyle(box),
+          c = box.getBoundingClientRect();
+        if (/auto|scroll/.test(`${style.overflowX} ${style.overflowY}`)) break;
+        if (/hidden|clip/.test(style.overflow) && (b.bottom > c.bottom + 2 || b.right > c.right + 2))
+          found.push(`control cut off: ${e.ariaLabel ?? name(e)}`);
+      }
+    }
+    // Controls of one row: none on top of another.
+    const controls = [...document.querySelectorAll('button, a.btn, select, input, textarea, .mapcanvas ~ *')].filter(
+        (e) => seen(e) && !/absolute|fixed|sticky/.test(getComputedStyle(e).position),
+      ),
+      by_parent = Map.groupBy(controls, (e) => e.parentElement);
+    for (const row of by_parent.values())
+      for (const [i, a] of row.entries())
+        for (const b of row.slice(i + 1)) {
+          const [p, q] = [a.getBoundingClientRect(), b.getBoundingClientRect()],
+            over = Math.min(p.right, q.right) - Math.max(p.left, q.left),
+            high = Math.min(p.bottom, q.bottom) - Math.max(p.top, q.top);
+          if (over > 3 && high > 3) found.push(`on each other: ${name(a)} and ${name(b)}`);
+        }
+    return [...new Set(found)];
+  });
+
 /** Opened by Enter on its opener, a dialog has the focus; Escape closes it, and the opener, or what is there in its place, has the focus again. */
 export async function opensByKeys(page, opener, dialog) {
   const has_focus = (locator) => locator.evaluate((e) => e.contains(document.activeElement)),

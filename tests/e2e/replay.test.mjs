@@ -81,6 +81,29 @@ test('. and , step through the events in the order of the flight, each at its ow
   await page.close();
 });
 
+test('nothing of the running flight is shown as a replay while the stored one is being read', async () => {
+  const page = await browser.context.newPage();
+  let go_on;
+  const held = new Promise((done) => (go_on = done));
+  await page.route('**/api/v1/fixes*', async (route) => {
+    await held;
+    await route.continue();
+  });
+  await page.goto(`${server.url}/#/replay/${mission}`);
+  await page.getByText('The flight is being read.').waitFor({ timeout: 20_000 });
+  await eventually(
+    'the strip says REPLAY',
+    async () => /REPLAY/.test(await text(page.getByTestId('status-link'))),
+    5000,
+  );
+  assert.equal(await page.getByTestId('range-list').count(), 0, 'no range of now');
+  for (const tile of ['rtk', 'uwb', 'drone'])
+    assert.doesNotMatch(await text(page.getByTestId(`status-${tile}`)), /FIX$|\d/, tile);
+  go_on();
+  await page.getByTestId('range-list').waitFor({ timeout: 20_000 });
+  await page.close();
+});
+
 test('while it plays, jumps and ends the strip says REPLAY; no command is there, and alarms stay those of now', async () => {
   const { page, id } = await opened({ width: 768, height: 1024 });
   const said = [];

@@ -1,7 +1,7 @@
 import { describe, expect, it } from 'vitest';
 import { grid, procedure, STEPS, turn } from '../src/live/flight_messages';
 import { ranks } from '../src/views/flight/picture';
-import { next_step, stage_of, STEP_WORDS, TRACK } from '../src/views/flight/words';
+import { missed_words, next_step, stage_of, STEP_WORDS, TRACK } from '../src/views/flight/words';
 
 describe('a message of the procedure', () => {
   it('needs its mission only, the rest is unknown', () => {
@@ -79,4 +79,16 @@ describe('ranks of candidates', () => {
         { value: 2, refused: null },
       ]),
     ).toEqual([0, 0]));
+});
+
+describe('a flight that is done', () => {
+  it('says so where anchors did not reach what was wanted: a plan flown to its end is not yet its goal', () => {
+    expect(missed_words('done', { done: 6, gave_up: 0, total: 6 })).toBe('');
+    expect(missed_words('done', { done: 4, gave_up: 2, total: 6 })).toBe(
+      'The plan is flown, but 2 of 6 anchors did not reach the accuracy that was wanted.',
+    );
+    expect(missed_words('done', { done: 0, gave_up: 6, total: 6 })).toMatch(/no anchor reached .*: 6 of 6 given up/);
+    expect(missed_words('running', { done: 0, gave_up: 5, total: 6 })).toBe('');
+    expect(missed_words('aborted', { done: 0, gave_up: 5, total: 6 })).toBe('');
+  });
 });

@@ -5,7 +5,7 @@ import { Scene } from '../src/state/scene';
 import { told_apart } from '../src/ui/format';
 import { grid_measure, grid_outcome, turn_runs, value_words } from '../src/views/flight/words';
 import { curve_mae } from '../src/views/models/mae';
-import { radio_state } from '../src/views/system/radio_state';
+import { last_seen_of_each, radio_state } from '../src/views/system/radio_state';
 
 describe('a radio', () => {
   const scene = new Scene('m');
@@ -19,6 +19,12 @@ describe('a radio', () => {
   it('of an old flight is not live because another one is recorded', () => {
     expect(radio_state('0x9', [scene], 12_000)).toBe('not in this flight');
     expect(radio_state('0x1', [], 12_000)).toBe('no flight');
+  });
+  it('that was in range in several flights is one row, last seen in the newest of them', () => {
+    const seen = (network_id: string | null, last_seen_us: number | null) => ({ network_id, last_seen_us });
+    expect(
+      last_seen_of_each([seen('0x1', 20), seen('0x6e01', 20), seen('0x1', 900), seen('0x1', null), seen(null, 5)]),
+    ).toEqual([seen('0x1', 900), seen('0x6e01', 20), seen(null, 5)]);
   });
 });
 

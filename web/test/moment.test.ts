@@ -1,5 +1,5 @@
 import { expect, it } from 'vitest';
-import { alarms_at, procedure_at } from '../src/state/moment';
+import { alarms_at, decision_at, procedure_at } from '../src/state/moment';
 import type { Mark } from '../src/state/recording';
 
 const at = (s: number, code: string, text: string, level = 'info'): Mark => ({ t_us: s * 1e6, code, text, level });
@@ -47,4 +47,20 @@ it('has the alarms that stood then as the list of Live has them, with since when
   expect(alarms_at(marks, 41e6)).toEqual([
     { id: 'uwb.none', priority: 'warning', title: 'no range for 5 s: check the tag', since_ms: 40e3, ...known },
   ]);
+});
+
+it('knows what was last decided about where to measure next, until the way home or another flight', () => {
+  const decided = [
+    ...marks,
+    at(36, 'procedure.go_to_point', 'better point found: lowest expected error: 1.780 m rms, before: 2.899 m'),
+    at(38, 'procedure.hold', 'held by the operator'),
+    at(50, 'procedure.find_next_point', 'time at this point is over'),
+    at(51, 'procedure.go_to_waypoint', 'enough here, to the next waypoint: 2 points measured at this waypoint'),
+    at(70, 'procedure.return_home', 'battery'),
+  ];
+  expect(decision_at(decided, 35e6)).toBeNull();
+  expect(decision_at(decided, 45e6)?.text).toMatch(/^better point found/);
+  expect(decision_at(decided, 50.5e6)?.text).toMatch(/^better point found/);
+  expect(decision_at(decided, 60e6)?.text).toMatch(/^enough here/);
+  expect(decision_at(decided, 71e6)).toBeNull();
 });

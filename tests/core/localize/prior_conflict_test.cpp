@@ -37,7 +37,7 @@ TEST(PriorConflict, IsTheReasonOfAnEstimateThatIsOtherwiseGood) {
   const FlightSolution solution = solve_flight(flight, options).value();
   const Estimate& estimate = solution.anchors[0].estimate;
   EXPECT_EQ(estimate.verdict, Verdict::ok);
-  EXPECT_TRUE(says(estimate.reason, "its height was taken for 7.50 m")) << estimate.reason;
+  EXPECT_TRUE(says(estimate.reason, "the height 7.50 m above the origin")) << estimate.reason;
   EXPECT_NEAR(estimate.best->position.m.z(), made.anchors[0].z(), 0.2) << "the ranges count";
   for (std::size_t i = 1; i < solution.anchors.size(); ++i)
     EXPECT_EQ(solution.anchors[i].estimate.reason, "") << i;

@@ -114,7 +114,11 @@ export default function ElevationView({
         <button class="eb" aria-label="Turn right by 15 degrees" onClick={() => turn(STEP_DEG)}>
           +15°
         </button>
-        <span class="n mut" data-testid="elevation-bearing">
+        <span
+          class="n mut"
+          data-testid="elevation-bearing"
+          title="Seen from the side: what is at the left and at the right, and the bearing to the right"
+        >
           {wind(bearing_deg + 180)} to {wind(bearing_deg)}, {bearing_words(bearing_deg)}°
         </span>
         <span class="grow" />

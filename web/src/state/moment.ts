@@ -37,6 +37,21 @@ export function procedure_at(marks: readonly Mark[], t_us: number): Moment | nul
   return now;
 }
 
+/// Where to measure next, as it was last decided on this way: to a better point, or enough here. Null where the way was not decided by that.
+export function decision_at(marks: readonly Mark[], t_us: number): Mark | null {
+  let decided: Mark | null = null,
+    before: Step | null = null;
+  for (const m of marks) {
+    if (m.t_us > t_us) break;
+    const step = step_of(m);
+    if (!step) continue;
+    if (before === 'find_next_point' && step !== 'hold') decided = m;
+    else if (step === 'take_off' || step === 'return_home') decided = null;
+    before = step;
+  }
+  return decided;
+}
+
 const PRIORITY: Readonly<Record<string, Priority>> = { critical: 'critical', warning: 'warning' };
 /// Newest last, their `since_ms` by the clock of the flight. "alarm.raised" says "id: what is wrong", "alarm.cleared" "id is over".
 export function alarms_at(marks: readonly Mark[], t_us: number): Alarm[] {

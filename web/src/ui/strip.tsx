@@ -153,7 +153,7 @@ function read(): Readings {
     rtk: {
       ...(rtk_stale ? { ...rtk_look, tone: 'off' } : rtk_look),
       stale: rtk_stale,
-      word: fix_word(r?.fix ?? null),
+      word: r ? fix_word(r.fix) : 'none',
       extra: rtk_stale ? aged(rtk_age) : r?.correction_age_s == null ? '' : `${fixed(r.correction_age_s, 1)} s`,
       card: r ? (
         <>

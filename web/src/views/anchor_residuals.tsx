@@ -6,7 +6,7 @@ import { by_suspicion, residuals, SECTORS, solves, weight_by_sector, type Residu
 import { link, when_back } from '../state/store';
 import { NotLoaded } from '../ui/empty';
 import { bearing, clock, fixed, millimetres, range_m } from '../ui/format';
-import { Axes, Drawing, scale, ticks, type Frame } from './chart';
+import { Axes, Drawing, scale, ticks, type Frame, room } from './chart';
 import { useStable } from '../ui/use_stable';
 
 interface Loaded {
@@ -111,7 +111,7 @@ function Scatter({
       cls="resid"
       label={`Residual over ${label} of ${seen.length} ranges; median ${millimetres(median(seen.map((r) => r.residual_m)))} mm`}
       draw={(w, h) => {
-        const f: Frame = { w, h, left: 44, right: 8, top: 8, bottom: 34 },
+        const f: Frame = { w, h, left: room(44), right: 8, top: 8, bottom: room(34) },
           x = scale(ends, [f.left, w - f.right]),
           y = scale([-most, most], [h - f.bottom, f.top]),
           clamp = (v: number): number => Math.max(-most, Math.min(most, v));

@@ -44,6 +44,11 @@ export function Drawing({
   );
 }
 
+/// Room for text, given for type of the usual 16 px: large type and the sun theme need more of it.
+export const room = (px: number): number =>
+  (px * (parseFloat(getComputedStyle(document.documentElement).fontSize) || 16)) / 16;
+const k_char_px = 7; ///< of tick text, on the wide side
+
 export const scale =
   (from: readonly [number, number], to: readonly [number, number]): Scale =>
   (v) =>
@@ -81,6 +86,17 @@ export function Axes({
   xw: (v: number) => string;
   yw: (v: number) => string;
 }) {
+  // A label that would run into the one before it is left out.
+  let end = -Infinity;
+  const labels = xs.flatMap((v) => {
+    const text = xw(v),
+      wide = room(text.length * k_char_px),
+      at_edge = x(v) > f.w - f.right - wide / 2,
+      from = x(v) - (at_edge ? wide : wide / 2);
+    if (from < end) return [];
+    end = from + wide;
+    return [{ v, text, anchor: at_edge ? 'end' : 'middle' } as const];
+  });
   return (
     <g>
       {ys.map((v) => (
@@ -91,15 +107,9 @@ export function Axes({
           </text>
         </g>
       ))}
-      {xs.map((v) => (
-        <text
-          key={`x${v}`}
-          class="ticktext"
-          x={x(v)}
-          y={f.h - f.bottom + 16}
-          text-anchor={x(v) > f.w - f.right - 12 ? 'end' : 'middle'}
-        >
-          {xw(v)}
+      {labels.map(({ v, text, anchor }) => (
+        <text key={`x${v}`} class="ticktext" x={x(v)} y={f.h - f.bottom + room(16)} text-anchor={anchor}>
+          {text}
         </text>
       ))}
     </g>

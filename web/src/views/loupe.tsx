@@ -45,6 +45,7 @@ export function Loupe({ e, size = 118 }: { e: EstimateMsg; size?: number }) {
 
 export function Covariance({ c }: { c: readonly number[] }) {
   const [ee, en, eu, nn, nu, uu] = c as [number, number, number, number, number, number];
+  const wide = Math.max(...c.map(Math.abs)) >= 1; // a position that is metres wide is not written in nine digits
   const rows: [string, number[]][] = [
     ['E', [ee, en, eu]],
     ['N', [en, nn, nu]],
@@ -53,7 +54,7 @@ export function Covariance({ c }: { c: readonly number[] }) {
   return (
     <table class="cov" data-testid="covariance">
       <caption>
-        Covariance <span class="mut">mm², E N U</span>
+        Covariance <span class="mut">{wide ? 'm²' : 'mm²'}, E N U</span>
       </caption>
       <thead>
         <tr>
@@ -71,7 +72,7 @@ export function Covariance({ c }: { c: readonly number[] }) {
             <th scope="row">{name}</th>
             {values.map((v, j) => (
               <td key={j} class={i === j ? 'diag' : ''}>
-                {grouped(v * 1e6)}
+                {wide ? fixed(v, 2) : grouped(v * 1e6)}
               </td>
             ))}
           </tr>

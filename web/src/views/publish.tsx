@@ -46,6 +46,7 @@ export function Publish({ mission }: { mission: MissionMsg }) {
     [moved, set_moved] = useState<ReadonlyMap<string, Moved>>(new Map()),
     [problem, set_problem] = useState(''),
     [busy, set_busy] = useState<'' | 'calibrating' | 'publishing' | 'planning'>('calibrating'),
+    [solving, set_solving] = useState(false),
     [picked, pick] = useState<string | null>(null);
   const solves = may('engineer');
   const keys = useRef({ calibrate: idempotency_key(), publish: idempotency_key() }),
@@ -67,12 +68,13 @@ export function Publish({ mission }: { mission: MissionMsg }) {
       void guarded('calibrating', async () => {
         // After landing the server has solved the flight by itself: that is what waits for review.
         const there = solves && anew ? null : await newest_calibration(mission.mission);
-        const solved =
-          there && (!solves || (there.after_landing && !in_air()))
-            ? there
-            : solves
-              ? await calibrate(mission.mission, keys.current.calibrate, arm_sigma_m)
-              : null;
+        const waits = there && (!solves || (there.after_landing && !in_air()));
+        set_solving(solves && !waits);
+        const solved = waits
+          ? there
+          : solves
+            ? await calibrate(mission.mission, keys.current.calibrate, arm_sigma_m)
+            : null;
         if (!solved) throw new Error('This flight is not solved yet: an engineer has to calibrate it first.');
         set_moved(await moved_since_published(solved.id).catch(() => new Map<string, Moved>()));
         set_draft(solved);
@@ -108,7 +110,7 @@ export function Publish({ mission }: { mission: MissionMsg }) {
     solve(true, arm_sigma_m);
   };
   const reviewed = draft?.rows.find((r) => r.anchor === picked) ?? null,
-    lacking = draft?.rows.filter((r) => !passes(r) || left[r.anchor] !== undefined) ?? [];
+    lacking = draft?.rows.filter((r) => !passes(r) || r.status === 'over_goal' || left[r.anchor] !== undefined) ?? [];
   const fly_again = (): void =>
     void guarded('planning', async () => {
       const made = await plan_again(mission.mission, lacking);
@@ -131,7 +133,9 @@ export function Publish({ mission }: { mission: MissionMsg }) {
         {draft?.after_landing
           ? `all ranges were solved together after landing, ${date(draft.created_at)}.`
           : solves
-            ? 'all stored ranges are solved again, together.'
+            ? !draft && !solving
+              ? 'its newest calibration is loading.'
+              : 'all stored ranges are solved again, together.'
             : 'the newest calibration by an engineer.'}{' '}
         {solves && draft?.after_landing && (
           <button class="btn small" data-testid="solve-again" disabled={busy !== ''} onClick={() => solve_again(null)}>
@@ -150,7 +154,7 @@ export function Publish({ mission }: { mission: MissionMsg }) {
           solve={solve_again}
         />
       )}
-      {busy === 'calibrating' && <p role="status">Solving {mission.n_ranges} ranges.</p>}
+      {busy === 'calibrating' && solving && <p role="status">Solving {mission.n_ranges} ranges.</p>}
       {problem && (
         <div class="problem" role="status">
           <b>That did not work.</b> {problem}

@@ -185,9 +185,12 @@ function Row({
           <Q v={range_m(r.corrected_m)} u="m" />
         </span>
         <span class="rw">
-          {[corrected ? `raw ${range_m(r.distance_m)} m` : '', r.sigma_m === null ? '' : `σ ${fixed(r.sigma_m, 2)} m`]
-            .filter(Boolean)
-            .join(', ')}
+          {corrected && `raw ${range_m(r.distance_m)} m`}
+          {r.sigma_m !== null && (
+            <span class="sigma">
+              {corrected && ', '}σ {fixed(r.sigma_m, 2)} m
+            </span>
+          )}
         </span>
       </td>
       <td class={`pl ${stale ? '' : tone}`}>

@@ -78,7 +78,7 @@ export function FlightBar() {
           </p>
         )}
         {!operator ? null : other ? (
-          <p class="why" data-testid="control">
+          <p class="why control theirs" data-testid="control">
             {other.holder} has control, since {new Date(other.since_us / 1000).toISOString().slice(11, 16)} UTC.{' '}
             <button
               class="btn small"
@@ -191,7 +191,7 @@ function BeforeTakeOff({ mission, note }: { mission: string; note: string }) {
 function Progress({ p }: { p: ProcedureMsg }) {
   const { done, gave_up, total } = done_count(current_scene(), current_mission.value),
     battery = p.drone?.battery ?? null,
-    needed = p.battery_needed;
+    needed = flying(p) ? p.battery_needed : null; // on the ground no way back is left
   return (
     <dl class="kv prog" data-testid="flight-progress">
       <div>

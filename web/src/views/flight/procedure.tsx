@@ -2,10 +2,11 @@
 import type { ComponentChildren } from 'preact';
 import '../desk.css';
 import type { GridMsg, ProcedureMsg, ProfileMsg, Step } from '../../live/flight_messages';
-import { current_scene, link, now_ms, tick } from '../../state/store';
+import { done_count } from '../../state/done';
+import { current_mission, current_scene, link, now_ms, tick } from '../../state/store';
 import { bearing, fixed } from '../../ui/format';
 import { Chip, Mark, Q } from '../../ui/marks';
-import { Axes, Drawing, line, scale, ticks } from '../chart';
+import { Axes, Drawing, line, scale, ticks, room } from '../chart';
 import { AfterLanding } from './after_landing';
 import { FlightTime } from './flight_time';
 import {
@@ -16,6 +17,7 @@ import {
   stage_of,
   STATUS_LOOK,
   STEP_WORDS,
+  missed_words,
   TRACK,
   value_words,
   turn_runs,
@@ -32,7 +34,9 @@ export function Procedure() {
   if (!latest) return null;
   const p = latest.value,
     stale = link.value === 'lost' || now_ms() - latest.at_ms > 5000,
-    [shape, tone, word] = STATUS_LOOK[p.status],
+    counted = done_count(scene, current_mission.value),
+    missed = missed_words(p.status, counted),
+    [shape, tone, word] = missed ? (['caution', 'caution', STATUS_LOOK[p.status][2]] as const) : STATUS_LOOK[p.status],
     next = next_step(p.step);
   const since =
     p.in_step_s === null ? null : p.in_step_s + (flying(p) && !stale ? (now_ms() - latest.at_ms) / 1000 : 0);
@@ -74,6 +78,11 @@ export function Procedure() {
       ) : (
         p.reason && <p class="why says">{sentence(p.reason)}</p>
       )}
+      {missed && (
+        <p class="callout caution says" data-testid="flight-missed">
+          {missed}
+        </p>
+      )}
       {(p.status === 'done' || p.status === 'aborted') && (
         <>
           <FlightTime mission={p.mission} />
@@ -97,7 +106,7 @@ export function Procedure() {
           The flight continues automatically when RTK shows that you are there.
         </div>
       )}
-      <NotDone p={p} />
+      <NotDone p={p} gave_up={counted.gave_up} />
     </section>
   );
 }
@@ -143,13 +152,14 @@ function Track({ step }: { step: Step }) {
   );
 }
 
-function NotDone({ p }: { p: ProcedureMsg }) {
+/// What the procedure still works for; what it gave up is not among it, and is not done either.
+function NotDone({ p, gave_up }: { p: ProcedureMsg; gave_up: number }) {
   const open = p.anchors.filter((a) => !a.done && a.why);
   if (!open.length) return null;
   return (
     <details class="notdone says">
       <summary>
-        {open.length} of {p.anchors.length} anchors not done
+        {open.length} of {p.anchors.length} anchors still open{gave_up > 0 && `, ${gave_up} given up`}
       </summary>
       <ul>
         {open.map((a) => (
@@ -355,7 +365,7 @@ function HeightProfile({ h: p }: { h: ProfileMsg }) {
         cls="roc"
         label={`RSS over height for ${p.anchor}${p.best === null ? '' : `; peak at ${fixed(p.best, 1)} m`}`}
         draw={(w, h) => {
-          const f = { w, h, left: 44, right: 10, top: 8, bottom: 22 },
+          const f = { w, h, left: room(44), right: 10, top: 8, bottom: room(22) },
             x = scale([r0, r1], [f.left, w - f.right]),
             y = scale([lo, hi], [h - f.bottom, f.top]);
           return (

@@ -1,5 +1,6 @@
 /// The procedure in words. No DOM.
 import type { FlightStatus, GridMsg, ProcedureMsg, Step } from '../../live/flight_messages';
+import type { DoneCount } from '../../state/done';
 import { fixed } from '../../ui/format';
 import type { Shape, Tone } from '../../ui/marks';
 
@@ -66,6 +67,13 @@ export const STATUS_LOOK: Record<FlightStatus, readonly [Shape, Tone, string]> =
   done: ['ok', 'ok', 'DONE'],
   aborted: ['bad', 'bad', 'ABORTED'],
 };
+/// A plan that was flown to its end is done; what it was flown for need not be. Empty where nothing is missing, or the flight is not over.
+export function missed_words(status: FlightStatus, { done, gave_up, total }: DoneCount): string {
+  if (status !== 'done' || gave_up === 0) return '';
+  return done === 0
+    ? `The plan is flown, and no anchor reached the accuracy that was wanted: ${gave_up} of ${total} given up.`
+    : `The plan is flown, but ${gave_up} of ${total} anchors did not reach the accuracy that was wanted.`;
+}
 export const flying = (p: ProcedureMsg): boolean =>
   p.status === 'running' || p.status === 'hold' || p.status === 'return' || p.status === 'landing';
 

@@ -3,7 +3,7 @@ import type { ComponentChildren } from 'preact';
 import { useEffect, useState } from 'preact/hooks';
 import type { Sample } from '../../api/measurements';
 import { fixed, grouped } from '../../ui/format';
-import { Axes, decimals, Drawing, scale, ticks, type Frame, type Scale } from '../chart';
+import { Axes, decimals, Drawing, scale, ticks, type Frame, type Scale, room } from '../chart';
 import { feature_words } from '../models/words';
 import { datasets, rss_line_of, type DatasetName } from '../../api/rules';
 import { histogram, level_at, PRINTED_LINE, sides, type RssLine } from './choice';
@@ -52,7 +52,7 @@ function Scatter({ samples, x, y, xw, yw, label, selected, select, over }: Cloud
         cls="scatter"
         label={`${label}, ${drawn.length} measurements`}
         draw={(w, h) => {
-          const f = { w, h, left: 76, right: 10, top: 8, bottom: 24 },
+          const f = { w, h, left: room(76), right: 10, top: 8, bottom: room(24) },
             xs = ticks(x0, x1),
             ys = ticks(y0, y1, 4),
             sx = scale([x0, x1], [f.left, w - f.right]),
@@ -277,7 +277,7 @@ export function HistogramPanel({ samples }: { samples: readonly Sample[] }) {
             const totals = bars.los.map((v, i) => v + bars.nlos[i]! + bars.unlabelled[i]!),
               top = Math.max(...totals),
               edges = bars.edges;
-            const f = { w, h, left: 44, right: 10, top: 8, bottom: 24 },
+            const f = { w, h, left: room(44), right: 10, top: 8, bottom: room(24) },
               x = scale([edges[0]!, edges[edges.length - 1]!], [f.left, w - f.right]),
               y = scale([0, top], [h - f.bottom, f.top]);
             const part = (cls: string, counts: readonly number[], under: (i: number) => number) =>

@@ -2,7 +2,7 @@
 import { useState } from 'preact/hooks';
 import type { Impulse, Sample } from '../../api/measurements';
 import { fixed } from '../../ui/format';
-import { Axes, Drawing, line, scale, ticks } from '../chart';
+import { Axes, Drawing, line, scale, ticks, room } from '../chart';
 import { marks_of, ns_of, shown_taps, summary } from './response';
 
 export interface Kept {
@@ -40,7 +40,7 @@ export function ResponsePlot({
         cls="cir"
         label={summary(r, m, sample.features)}
         draw={(w, h) => {
-          const f = { w, h, left: 48, right: 10, top: 38, bottom: 24 },
+          const f = { w, h, left: room(48), right: 10, top: 38, bottom: room(24) },
             x = scale([x0, x1], [f.left, w - f.right]),
             y = scale([0, top], [h - f.bottom, f.top]),
             inside = (v: number): boolean => v >= x0 && v <= x1;

@@ -1,7 +1,7 @@
 /// Distribution of |bias|, raw and corrected, with what 50, 90 and 95 % of the ranges stay below.
 import type { Curve, Run } from '../../api/learning';
 import { fixed } from '../../ui/format';
-import { Axes, Drawing, line, scale, ticks } from '../chart';
+import { Axes, Drawing, line, scale, ticks, room } from '../chart';
 import { curve_mae, is_raw } from './mae';
 import { method_words } from './words';
 
@@ -24,7 +24,7 @@ export function BiasPanel({ curves, run }: { curves: readonly Curve[]; run: Run 
           cls="cdf"
           label={sorted.map((c) => `${method_words(c.method)}: 90 % below ${mm(c.p90_m)} mm`).join('; ')}
           draw={(w, h) => {
-            const f = { w, h, left: 44, right: 12, top: 8, bottom: 24 },
+            const f = { w, h, left: room(44), right: 12, top: 8, bottom: room(24) },
               x = scale([0, top], [f.left, w - f.right]),
               y = scale([0, 1], [h - f.bottom, f.top]);
             return (

@@ -3,7 +3,7 @@ import { useState } from 'preact/hooks';
 import type { Confusion, Roc } from '../../api/learning';
 import { fixed, grouped } from '../../ui/format';
 import { Chip, Mark, Q } from '../../ui/marks';
-import { Axes, Drawing, line, scale, ticks } from '../chart';
+import { Axes, Drawing, line, scale, ticks, room } from '../chart';
 
 const share = (part: number, whole: number): string => fixed(whole ? (part / whole) * 100 : null, 1);
 
@@ -111,7 +111,7 @@ export function ThresholdPanel({ roc, los, nlos }: { roc: Roc; los: number; nlos
           `LOS kept and ${fixed(at.fpr * 100, 1)} % of NLOS classified as LOS`
         }
         draw={(w, h) => {
-          const f = { w, h, left: 44, right: 10, top: 8, bottom: 22 },
+          const f = { w, h, left: room(44), right: 10, top: 8, bottom: room(22) },
             x = scale([0, x_max], [f.left, w - f.right]),
             y = scale([0, 1], [h - f.bottom, f.top]);
           return (

@@ -5,7 +5,7 @@ import { is_bias, run_numbers, run_page, type Run, type RunNumbers, type Task } 
 import { fixed } from '../../ui/format';
 import { Icon } from '../../ui/marks';
 import { Unknown } from '../../ui/unknown';
-import { Axes, Drawing, line, scale, ticks } from '../chart';
+import { Axes, Drawing, line, scale, ticks, room } from '../chart';
 import { run_names } from './words';
 
 export const MOST_COMPARED = 4;
@@ -241,7 +241,7 @@ function Curves({ sides, bias }: { sides: readonly Side[]; bias: boolean }) {
       cls="cdf"
       label={`${bias ? 'Share of ranges with |bias| below x' : 'Share of LOS kept over share of NLOS called LOS'}, one curve a run`}
       draw={(w, h) => {
-        const f = { w, h, left: 44, right: 12, top: 8, bottom: 24 },
+        const f = { w, h, left: room(44), right: 12, top: 8, bottom: room(24) },
           x = scale([0, top], [f.left, w - f.right]),
           y = scale([0, 1], [h - f.bottom, f.top]);
         return (

@@ -3,7 +3,7 @@ import { setting, type Check, type Plan } from '../../api/plans';
 import type { Geodetic } from '../../map/enu';
 import { clock, fixed, grouped } from '../../ui/format';
 import { Chip } from '../../ui/marks';
-import { Axes, Drawing, line, scale, ticks } from '../chart';
+import { Axes, Drawing, line, scale, ticks, room } from '../chart';
 import type { Picked } from './draft';
 import { profile } from './profile';
 
@@ -120,7 +120,7 @@ export function Profile({
           `ground${out.length ? `, ${new Set(out.map((m) => m.waypoint)).size} of them outside of ${fixed(low, 1)} to ${fixed(high, 1)} m` : ''}`
         }
         draw={(w, h) => {
-          const f = { w, h, left: 44, right: 10, top: 8, bottom: 24 },
+          const f = { w, h, left: room(44), right: 10, top: 8, bottom: room(24) },
             x = scale([0, end || 1], [f.left, w - f.right]),
             y = scale([0, top], [h - f.bottom, f.top]),
             edge = (v: number, cls: string, words: string, above: boolean) =>

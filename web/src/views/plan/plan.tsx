@@ -47,7 +47,7 @@ export function Plan({ id }: { id: string | null }) {
       )}
       {back_ms !== null && desk.dirty && !theirs && (
         <div class="callout" role="status" data-testid="brought-back">
-          <b>Your changes of {age(Date.now() - back_ms)} ago are back.</b> They were not saved when the page was closed.{' '}
+          <b>Changes of {age(Date.now() - back_ms)} ago, not saved yet.</b> They are kept on this device until then.{' '}
           <button class="btn small" onClick={() => desk.open(desk.saved)}>
             Discard them
           </button>

@@ -7,7 +7,8 @@ import { MapBox } from '../../map/map_box';
 import { after, estimates_over_time, load_recording, neighbour, Player } from '../../state/recording';
 import { shown_estimates } from '../../state/done';
 import { backdrops } from '../../state/floors';
-import { alarms_at, procedure_at, status_of } from '../../state/moment';
+import { alarms_at, decision_at, procedure_at, status_of } from '../../state/moment';
+import { Scene } from '../../state/scene';
 import {
   chosen_anchor,
   mission_id,
@@ -58,6 +59,8 @@ export function Replay({ id }: { id: string | null }) {
     document.title = 'Replay - anchord';
     if (!mission) return;
     let gone = false;
+    // From the first moment nothing here is of now: while the flight is read, its scene is empty.
+    replayed.value = { scene: new Scene(mission.mission), mission: { ...mission, state: 'recording' }, at_s };
     load_recording(mission).then(
       async (recording) => {
         const made = new Player(recording);
@@ -236,7 +239,15 @@ export function Replay({ id }: { id: string | null }) {
         />
         <aside class="side" aria-label="Ranges and anchor of the recording" tabIndex={0}>
           {player && <Then player={player} />}
-          <RangeList selected={selected} />
+          {player ? (
+            <RangeList selected={selected} />
+          ) : (
+            !failed && (
+              <p class="why pad" role="status">
+                The flight is being read.
+              </p>
+            )
+          )}
           {moment === 'asked' && player && (
             <p class="why pad" role="status">
               Positions of each moment are being computed from the stored ranges.
@@ -302,7 +313,8 @@ export function Replay({ id }: { id: string | null }) {
 function Then({ player }: { player: Player }) {
   const { marks } = player.recording,
     p = procedure_at(marks, player.t_us),
-    alarms = alarms_at(marks, player.t_us);
+    alarms = alarms_at(marks, player.t_us),
+    decided = decision_at(marks, player.t_us);
   const [shape, tone, word] =
     p?.step === 'done' ? (['off', 'off', 'LANDED'] as const) : STATUS_LOOK[status_of(p?.step ?? 'ready')];
   return (
@@ -341,10 +353,12 @@ function Then({ player }: { player: Player }) {
       {p && p.step !== 'done' && p.step !== 'ready' && (
         <section class="sec-p" data-testid="replay-next-point">
           <h2>Next point</h2>
-          <p class="why">
-            The candidates for the next point are shown only during a flight and are not stored. The decisions are
-            listed in the events.
-          </p>
+          {decided && (
+            <p class="why">
+              {sentence(decided.text)} Decided at {clock((decided.t_us - player.recording.from_us) / 1e6)}.
+            </p>
+          )}
+          <p class="why mut">The candidates for the next point are shown only during a flight and are not stored.</p>
         </section>
       )}
     </>

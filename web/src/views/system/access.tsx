@@ -194,7 +194,9 @@ export function AuditPanel() {
           <tbody>
             {lines?.map((l, i) => (
               <tr key={`${l.at}${i}`}>
-                <th scope="row">{l.at.slice(0, 19).replace('T', ' ')}</th>
+                <th scope="row" class="whole">
+                  {l.at.slice(0, 19).replace('T', ' ')}
+                </th>
                 <td>{l.who}</td>
                 <td class="wrap">{l.what}</td>
                 <td>{l.result}</td>

@@ -77,7 +77,7 @@ export function LeverPanel() {
           <tbody>
             {flight.tags.map((t) => (
               <tr key={`${t.tag}${t.antenna}`}>
-                <th scope="row">
+                <th scope="row" class="whole">
                   {t.tag}
                   {t.antenna ? `, antenna ${t.antenna}` : ''}
                 </th>

@@ -18,3 +18,15 @@ export function radio_state(id: string, recording: readonly Scene[], now_ms: num
   const silence = now_ms - at_ms;
   return silence > LOST_MS ? 'lost' : silence > LATE_MS ? 'late' : 'live';
 }
+
+/// The server lists a radio once for every flight it was in range in; on the screen it is one radio, as it was last seen.
+export function last_seen_of_each<
+  R extends { readonly network_id: string | null; readonly last_seen_us: number | null },
+>(radios: readonly R[]): R[] {
+  const newest = new Map<string | null, R>();
+  for (const r of radios) {
+    const before = newest.get(r.network_id);
+    if (!before || (r.last_seen_us ?? 0) > (before.last_seen_us ?? 0)) newest.set(r.network_id, r);
+  }
+  return [...newest.values()].sort((a, b) => (b.last_seen_us ?? 0) - (a.last_seen_us ?? 0));
+}
