@@ -47,7 +47,7 @@ TEST(RangeScale, WithholdsEveryAnchorWhereAllRangesHaveAFactor) {
         const Gate& gate = scale_gate(anchor);
         EXPECT_FALSE(gate.passed) << factor << ' ' << gate.why;
         EXPECT_GT(gate.value.value_or(0), gate.limit);
-        expect_says(gate, factor > 1 ? "too long by a factor, all of them" : "too short by a factor");
+        expect_says(gate, factor > 1 ? "too long by a factor (all ranges)" : "too short by a factor");
         expect_says(gate, "check the unit of the ranges");
         EXPECT_FALSE(anchor.estimate.acceptable());
       }
@@ -76,7 +76,7 @@ TEST(RangeScale, WithholdsTheOneAnchorWhoseRangesHaveAFactor) {
   for (const AnchorSolution& anchor : solve_flight(flight).value().anchors) {
     const bool has_one = anchor.estimate.anchor == NetworkId{0x6001};
     EXPECT_EQ(scale_gate(anchor).passed, !has_one) << scale_gate(anchor).why;
-    if (has_one) expect_says(scale_gate(anchor), "those of this anchor");
+    if (has_one) expect_says(scale_gate(anchor), "of this anchor");
   }
 }
 

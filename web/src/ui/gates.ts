@@ -57,7 +57,7 @@ const WORDS: Record<string, Words> = {
     unit: 'm',
   },
   range_scale: {
-    passes: 'The ranges show no factor on their length',
+    passes: 'No scale error of the ranges is seen',
     fails: 'The ranges are too long or too short by a factor: wrong unit, clock or setting of the radios',
     unit: '%',
   },
