@@ -35,7 +35,7 @@ struct RangeScale {
 /// slope is an unknown beside it, so that a small hall alone shows no factor.
 ///
 /// A factor that the ranges cannot exclude is in the regions, as a shift of the track is (track_shift.hpp):
-/// before the ranges one flight in twenty has one.
+/// before the ranges one flight in eight has one.
 /// errors  canceled
 Result<RangeScale> check_range_scale(const FlightRows& flight, const JointFit& fit, const SharedPrior& prior,
                                      const FlightOptions& options);

@@ -62,7 +62,8 @@ TEST(RangeScale, NamesTheAntennaWhoseRangesHaveAFactor) {
     flight.ranges[i].tag = NetworkId{0x6e02};
     flight.ranges[i].distance_m *= 1.05;
   }
-  for (const AnchorSolution& anchor : solve_flight(flight).value().anchors) {
+  const FlightSolution solution = solve_flight(flight).value();
+  for (const AnchorSolution& anchor : solution.anchors) {
     EXPECT_FALSE(scale_gate(anchor).passed);
     expect_says(scale_gate(anchor), "0x6e02");
     EXPECT_FALSE(anchor.estimate.acceptable());
@@ -73,7 +74,8 @@ TEST(RangeScale, WithholdsTheOneAnchorWhoseRangesHaveAFactor) {
   FlightData flight = make_flight(turning(4));
   for (Range& range : flight.ranges)
     if (range.anchor == NetworkId{0x6001}) range.distance_m *= 1.03;
-  for (const AnchorSolution& anchor : solve_flight(flight).value().anchors) {
+  const FlightSolution solution = solve_flight(flight).value();
+  for (const AnchorSolution& anchor : solution.anchors) {
     const bool has_one = anchor.estimate.anchor == NetworkId{0x6001};
     EXPECT_EQ(scale_gate(anchor).passed, !has_one) << scale_gate(anchor).why;
     if (has_one) expect_says(scale_gate(anchor), "of this anchor");
