@@ -108,7 +108,7 @@ void Application::State::publish_alarms(UtcTime now, std::vector<AlarmCondition>
   for (auto& [id, text] : of_flight) {
     const bool told = std::any_of(holding.begin(), holding.end(), [&](const auto& c) { return c.id == id; });
     if (!text.empty() && !told)
-      holding.push_back({std::string(id), AlarmPriority::critical, std::move(text), std::nullopt});
+      holding.push_back({std::string(id), AlarmPriority::critical, std::move(text), flights.mission()});
   }
   if (auto step = clock_watch.look(now, steady.now()); !step.empty())
     holding.push_back({"clock.step", AlarmPriority::warning, std::move(step), std::nullopt});
@@ -122,9 +122,20 @@ void Application::State::publish_alarms(UtcTime now, std::vector<AlarmCondition>
   for (auto& alarm : stream.alarms()) holding.push_back(std::move(alarm));
   for (auto& alarm : contradictions.alarms()) holding.push_back(std::move(alarm));
   alarms.update(std::move(holding), now);
-  std::string list = "[";
-  for (const auto& alarm : alarms.standing()) list += (list.size() > 1 ? "," : "") + alarm_json(alarm);
-  hub.publish(Topic::alarms, list + ']', now.us());
+  // With their sites: the hub asks while it is locked.
+  std::vector<std::pair<Alarm, std::optional<SiteId>>> standing;
+  for (auto& alarm : alarms.standing()) {
+    const auto& mission = alarm.condition.mission;
+    auto site = mission ? hub.site_of(*mission) : std::nullopt;
+    standing.emplace_back(std::move(alarm), site);
+  }
+  const auto list = [standing = std::move(standing)](const SiteSet& sites) {
+    std::string json = "[";
+    for (const auto& [alarm, site] : standing)
+      if (concerns(alarm, site, sites)) json += (json.size() > 1 ? "," : "") + alarm_json(alarm);
+    return json + ']';
+  };
+  hub.publish_parts(Topic::alarms, list({}), now.us(), list);
 }
 
 }  // namespace anchord::api

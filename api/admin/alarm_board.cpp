@@ -33,6 +33,11 @@ std::string alarm_json(const Alarm& alarm) {
          (alarm.acknowledged ? "true}" : "false}");
 }
 
+bool concerns(const Alarm& alarm, const std::optional<SiteId>& site, const SiteSet& sites) {
+  const auto& c = alarm.condition;
+  return c.mission ? sites.holds(site) : sites.all() || !c.of_sites;
+}
+
 void AlarmBoard::update(std::vector<AlarmCondition> holding, UtcTime now) {
   std::vector<AlarmCondition> raised, cleared;
   {

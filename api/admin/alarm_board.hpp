@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -7,6 +8,7 @@
 #include "api/admin/alarm_rules.hpp"
 #include "core/base/locked.hpp"
 #include "core/base/result.hpp"
+#include "core/base/site_set.hpp"
 
 namespace anchord::api {
 
@@ -20,6 +22,9 @@ struct Alarm {
 };
 /// As topic `alarms` and GET /alarms show it.
 std::string alarm_json(const Alarm& alarm);
+/// Whether it concerns who sees these sites: what is of the whole server (disk, link, devices) concerns all
+/// who fly. `site`: of its mission.
+bool concerns(const Alarm& alarm, const std::optional<SiteId>& site, const SiteSet& sites);
 
 /// The alarms that stand: raised when their condition begins, gone when it ends, quiet but visible once
 /// acknowledged. Raising, clearing and acknowledging are events. Thread-safe.

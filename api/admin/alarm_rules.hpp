@@ -25,6 +25,7 @@ struct AlarmCondition {
   AlarmPriority priority{AlarmPriority::warning};
   std::string text;
   std::optional<MissionId> mission{};
+  bool of_sites{false};  ///< its text names what is of several sites
 };
 
 struct ServerPulse {

@@ -161,7 +161,7 @@ std::vector<AlarmCondition> ContradictionWatch::alarms() const {
     if (n++ < k_named) text += (text.empty() ? "" : ". ") + anchor.text;
   }
   if (n > k_named) text += ". And " + std::to_string(n - k_named) + " more: see the anchors' status";
-  return {{"anchor.contradicted", AlarmPriority::warning, std::move(text), std::nullopt}};
+  return {{"anchor.contradicted", AlarmPriority::warning, std::move(text), std::nullopt, true}};
 }
 
 Result<ContradictionWatch::Standing> ContradictionWatch::compare() {

@@ -353,6 +353,12 @@ std::vector<std::pair<std::string_view, std::string>> FlightService::alarms() {
   return w->operations.alarms();
 }
 
+std::optional<MissionId> FlightService::mission() const {
+  const auto w = state_->work.lock();
+  const auto& flight = w->operations.flight();
+  return flight ? std::optional(flight->mission) : std::nullopt;
+}
+
 std::string FlightService::metrics() const {
   return state_->checks_apart.text("anchord_safety_interval_seconds");
 }

@@ -84,6 +84,8 @@ class FlightService final : public MissionObserver, public MissionControl {
   /// Whether this mission's flight is in the air; and which mission flies this plan.
   bool flies(const MissionId& mission) override;
   std::optional<MissionId> flown_with(const PlanId& plan);
+  /// Of the flight that is flown, or was flown last.
+  std::optional<MissionId> mission() const;
   /// What the plan that the mission is or was flown by wants of its anchors; empty: none, flown by hand.
   PlanTargets targets(const MissionId& mission);
   /// How long its newest flight took beside its forecast; nothing in the air, and where none was.

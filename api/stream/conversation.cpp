@@ -27,7 +27,7 @@ std::int64_t steady_us() {
 std::string snap_of(const Subscription& subscription, const Resumed& start, bool keyed) {
   std::vector<LiveElement> wanted;
   for (const auto& element : start.snapshot) {
-    if (subscription.wants(element)) wanted.push_back(element);
+    if (subscription.wants(element)) wanted.push_back(subscription.seen(element));
   }
   return snap_frame(subscription.id, start.last_seq, start.t_us, wanted, keyed);
 }

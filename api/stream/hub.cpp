@@ -80,15 +80,22 @@ std::optional<SiteId> Hub::site_of(const MissionId& mission) const {
 
 void Hub::publish(Topic topic, std::string json, std::int64_t t_us, std::string key,
                   std::optional<NetworkId> anchor, const std::optional<MissionId>& mission) {
-  LiveElement element{std::move(key), anchor, std::make_shared<const std::string>(std::move(json)), {}};
+  LiveElement element{std::move(key), anchor, std::make_shared<const std::string>(std::move(json)), {}, {}};
   auto bus = bus_.lock();
   element.site = bus->site_of(mission);
   send(*bus, topic, {std::move(element)}, t_us);
 }
 
+void Hub::publish_parts(Topic topic, std::string json, std::int64_t t_us,
+                        std::function<std::string(const SiteSet&)> part) {
+  LiveElement element{{}, {}, std::make_shared<const std::string>(std::move(json)), {}, std::move(part)};
+  auto bus = bus_.lock();
+  send(*bus, topic, {std::move(element)}, t_us);
+}
+
 void Hub::collect(Topic topic, std::string json, std::int64_t t_us, const MissionId& mission,
                   std::optional<NetworkId> anchor) {
-  LiveElement element{{}, anchor, std::make_shared<const std::string>(std::move(json)), {}};
+  LiveElement element{{}, anchor, std::make_shared<const std::string>(std::move(json)), {}, {}};
   auto bus = bus_.lock();
   element.site = bus->site_of(mission);
   auto& channel = bus->of(topic);

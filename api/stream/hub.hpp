@@ -4,6 +4,7 @@
 #include <atomic>
 #include <cstdint>
 #include <deque>
+#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
@@ -14,6 +15,7 @@
 
 #include "core/base/ids.hpp"
 #include "core/base/locked.hpp"
+#include "core/base/site_set.hpp"
 #include "core/base/time.hpp"
 
 namespace anchord::api {
@@ -61,6 +63,8 @@ struct LiveElement {
   std::optional<NetworkId> anchor{};  ///< for params.anchors
   std::shared_ptr<const std::string> json;
   std::optional<SiteId> site{};  ///< of its mission; none: for those who see all sites
+  /// Of what is of many sites at once: what of it is for a client that sees these; else null.
+  std::function<std::string(const SiteSet&)> part{};
 };
 
 /// What one publish() made: its number in the topic and its elements.
@@ -143,6 +147,10 @@ class Hub {
   /// some sites.
   void publish(Topic topic, std::string json, std::int64_t t_us, std::string key = {},
                std::optional<NetworkId> anchor = {}, const std::optional<MissionId>& mission = {});
+  /// Sends an object of many missions now: `json` whole, or, to who sees only some sites, what `part` makes
+  /// of it.
+  void publish_parts(Topic topic, std::string json, std::int64_t t_us,
+                     std::function<std::string(const SiteSet&)> part);
   /// Collects an element of a stream; tick() sends them together, at most 20 frames a second.
   void collect(Topic topic, std::string json, std::int64_t t_us, const MissionId& mission,
                std::optional<NetworkId> anchor = {});

@@ -36,7 +36,7 @@ void Outbox::start(std::uint64_t sub, std::uint64_t last_seq,
   queue.started = true;
   if (queue.subscription.deltas) {
     for (const auto& element : snapshot)
-      if (queue.subscription.wants(element)) queue.shown[element.key] = element.json;
+      if (queue.subscription.wants(element)) queue.shown[element.key] = queue.subscription.seen(element).json;
   }
   for (const auto& message : missed) {
     const auto& elements = message->elements;
@@ -73,7 +73,7 @@ bool Outbox::put(const std::shared_ptr<const LiveMessage>& message, Topic topic,
                                  [&](const auto& e) { return queue.subscription.wants(e); });
     if (!any) continue;
     if (cls == TopicClass::state) {
-      queue.only = queue.newest.empty() ? message : nullptr;
+      queue.only = queue.newest.empty() && queue.subscription.sites.all() ? message : nullptr;
       for (const auto& element : elements) {
         if (!queue.subscription.wants(element)) {
           queue.only = nullptr;
@@ -86,7 +86,7 @@ bool Outbox::put(const std::shared_ptr<const LiveMessage>& message, Topic topic,
           const bool asked_for_less = queue.subscription.min_interval_us > 0 || queue.subscription.deltas;
           conflated_since_heartbeat_ |= !asked_for_less || now_us - queue.due_us > k_grace_us;
         }
-        pending = {element, message->seq, message->t_us};
+        pending = {queue.subscription.seen(element), message->seq, message->t_us};
       }
       continue;
     }
@@ -267,7 +267,7 @@ std::shared_ptr<const std::string> Outbox::take_messages(Queue& queue, std::dequ
     ++taken;
     size += last->bytes();
     for (const auto& element : last->elements) {
-      if (subscription.wants(element)) elements.push_back(element);
+      if (subscription.wants(element)) elements.push_back(subscription.seen(element));
     }
   }
   std::shared_ptr<const std::string> frame;

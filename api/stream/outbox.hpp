@@ -28,8 +28,14 @@ struct Subscription {
   std::uint64_t last_seq{0};  ///< last seq this subscription was sent, for `prev`
 
   bool wants(const LiveElement& element) const {
-    return sites.holds(element.site) &&
+    return (element.part || sites.holds(element.site)) &&
            (anchors.empty() || !element.anchor || anchors.count(*element.anchor) > 0);
+  }
+  /// One that it wants, as this client may see it.
+  LiveElement seen(const LiveElement& element) const {
+    LiveElement out = element;
+    if (element.part && !sites.all()) out.json = std::make_shared<const std::string>(element.part(sites));
+    return out;
   }
 };
 

@@ -1,4 +1,5 @@
 // What the live stream shows to tokens that are bound to sites, topic by topic.
+#include "api/admin/alarm_board.hpp"
 #include "api/admin/event_log.hpp"
 #include "api/stream/ws_handler.hpp"
 #include "site_tokens_fixture.hpp"
@@ -53,6 +54,35 @@ TEST_F(SiteTokenStream, ShowsOnEveryTopicWhatIsOfItsSitesAlone) {
   }
   EXPECT_NE(of_alpha.find(alpha_.id("mission")), std::string::npos);
   for (auto* client : {&alpha, &bravo, &all}) (*client)->on_close();
+}
+
+// Who flies must have the alarms: those of its own missions and of the whole server, and no other's.
+TEST_F(SiteTokenStream, ShowsAlarmsOfTheServerAndOfItsMissions) {
+  const auto alarm = [](const char* id, std::optional<MissionId> mission, bool of_sites) {
+    return api::Alarm{{id, api::AlarmPriority::warning, "text", mission, of_sites}, {}, false};
+  };
+  const MissionId of_alpha{parse_uuid(alpha_.id("mission")).value()};
+  const auto site = app_->hub().site_of(of_alpha);
+  ASSERT_TRUE(site);
+  const auto& alpha = alpha_.who.sites;
+  const auto& bravo = bravo_.who.sites;
+  EXPECT_TRUE(api::concerns(alarm("storage.readonly", {}, false), {}, bravo));
+  EXPECT_TRUE(api::concerns(alarm("rtk.lost", of_alpha, false), site, alpha));
+  EXPECT_FALSE(api::concerns(alarm("rtk.lost", of_alpha, false), site, bravo));
+  EXPECT_FALSE(api::concerns(alarm("anchor.contradicted", {}, true), {}, alpha)) << "names anchors of both";
+  EXPECT_TRUE(api::concerns(alarm("anchor.contradicted", {}, true), {}, SiteSet{}));
+
+  auto client = listen(bravo_.who), all = listen(api::local_principal());
+  app_->hub().publish_parts(api::Topic::alarms, R"(["whole"])", 1,
+                            [](const SiteSet&) { return R"(["part"])"; });
+  auto late = listen(bravo_.who);
+  for (auto* one : {&client, &late}) {
+    const auto got = frames(**one);
+    EXPECT_NE(got.find(R"(["part"])"), std::string::npos) << got;
+    EXPECT_EQ(got.find(R"(["whole"])"), std::string::npos) << got;
+  }
+  EXPECT_NE(frames(*all).find(R"(["whole"])"), std::string::npos);
+  for (auto* one : {&client, &late, &all}) (*one)->on_close();
 }
 
 TEST_F(SiteTokenStream, AResumedStreamLeavesOutWhatWasOfAnotherSite) {
