@@ -107,6 +107,7 @@ constexpr std::array k_gate_words{
     GateWords{"moved", "It is where it was", "χ²"},
     GateWords{"bias", "Range bias of the kit, σ", "m"},
     GateWords{"lever_arm", "The lever arm fits the flight", "σ"},
+    GateWords{"clock", "Clock of the ranges against that of the track", "s"},
     GateWords{"unseen_arm", "Error that a wrong lever arm would cause unseen", "m"},
     GateWords{"track_shift", "The track came back from its gaps where it was", "χ²"},
     GateWords{"track", "Positions off the others as a whole", "%"},
