@@ -10,8 +10,7 @@ using Ordered = nlohmann::ordered_json;
 
 const std::vector<ProblemType>& problem_types() {
   static const std::vector<ProblemType> k_types{
-      {"validation", "Request body is not valid",
-       "Fields are wrong; errors lists every one with its pointer."},
+      {"validation", "Request is not valid", "Fields are wrong; errors lists every one with its pointer."},
       {"malformed", "Request cannot be read", "The request is not well-formed JSON, CSV or HTTP."},
       {"unauthorized", "Authentication needed", "Send a token as Authorization: Bearer, or log in."},
       {"forbidden", "Not allowed", "The token is valid but lacks the role that is named."},
