@@ -42,8 +42,14 @@ std::vector<AnchorFeature> live(AnchorApi& s, const std::optional<MissionId>& mi
   return out;
 }
 
+/// West of an area over the date line is east of its east (RFC 7946, 5.2).
 struct Box {
   double west, south, east, north;
+  bool holds(const Wgs84& at) const {
+    const bool along =
+        west > east ? at.lon_deg >= west || at.lon_deg <= east : at.lon_deg >= west && at.lon_deg <= east;
+    return along && at.lat_deg >= south && at.lat_deg <= north;
+  }
 };
 std::optional<Box> query_box(const Request& request) {
   const auto text = request.query_value("bbox");
@@ -54,7 +60,11 @@ std::optional<Box> query_box(const Request& request) {
     throw_problem(422, "validation", "bbox must be west,south,east,north in degrees",
                   {{"/bbox", "bad_value", "must be four numbers"}});
   }
-  return Box{numbers[0], numbers[1], numbers[2], numbers[3]};
+  const Box box{numbers[0], numbers[1], numbers[2], numbers[3]};
+  if (box.south > box.north)
+    throw_problem(422, "validation", "bbox is west,south,east,north in degrees",
+                  {{"/bbox", "bad_value", "has its south above its north"}});
+  return box;
 }
 
 }  // namespace
@@ -81,9 +91,7 @@ std::vector<AnchorFeature> selected_anchors(AnchorApi& s, const Request& request
     if (site && (!feature.anchor.site || to_string(*feature.anchor.site) != *site)) return true;
     if (!box) return false;
     if (!feature.estimate || !feature.estimate->best || !feature.estimate->best->wgs84) return true;
-    const auto& at = *feature.estimate->best->wgs84;
-    return at.lon_deg < box->west || at.lon_deg > box->east || at.lat_deg < box->south ||
-           at.lat_deg > box->north;
+    return !box->holds(*feature.estimate->best->wgs84);
   });
   return all;
 }

@@ -17,6 +17,12 @@ using Type = FeatureTable::Type;
 using Value = FeatureTable::Value;
 
 Eigen::Vector3d vertex(const Wgs84& at) { return {at.lon_deg, at.lat_deg, at.height_m}; }
+/// A line or ring over the date line goes on beyond 180 degrees: from 180 to -180 it would go round the
+/// globe.
+void keep_together(std::vector<Eigen::Vector3d>& vertices) {
+  for (std::size_t i = 1; i < vertices.size(); ++i)
+    vertices[i].x() += 360.0 * std::round((vertices[i - 1].x() - vertices[i].x()) / 360.0);
+}
 Value text(const std::string& value) { return value.empty() ? Value{} : Value{value}; }
 template <class T>
 Value known(const std::optional<T>& value) {
@@ -150,6 +156,7 @@ FeatureTable ellipses_table(std::span<const AnchorFeature> anchors) {
       row.vertices.push_back(vertex(here.wgs84_from_enu(at)));
     }
     row.vertices.push_back(row.vertices.front());
+    keep_together(row.vertices);
     row.values = {to_string(f.anchor.network_id), ellipse.major_m, ellipse.minor_m, ellipse.azimuth_deg};
     out.rows.push_back(std::move(row));
   }
@@ -182,6 +189,7 @@ FeatureTable tracks_table(std::span<const AnchorFeature> anchors, MissionStore& 
     FeatureTable::Row row;
     if (track.vertices.size() > 1) {
       for (const auto& one : track.vertices) row.vertices.push_back(vertex(one.at));
+      keep_together(row.vertices);
     }
     row.values = {to_string(id), text(of_mission.name), to_rfc3339(of_mission.created),
                   static_cast<std::int64_t>(track.n_fixes), track.spacing_m};

@@ -107,6 +107,7 @@ constexpr std::array k_gate_words{
     GateWords{"moved", "Same position as before", "χ²"},
     GateWords{"bias", "Range bias of the kit, σ", "m"},
     GateWords{"lever_arm", "The lever arm fits the flight", "σ"},
+    GateWords{"clock", "Clock of the ranges against the clock of the track", "s"},
     GateWords{"unseen_arm", "Undetected error that a wrong lever arm would cause", "m"},
     GateWords{"range_scale", "Scale error of the ranges", "%"},
     GateWords{"track_shift", "No shift of the track at its gaps", "χ²"},

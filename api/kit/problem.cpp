@@ -10,7 +10,7 @@ using Ordered = nlohmann::ordered_json;
 
 const std::vector<ProblemType>& problem_types() {
   static const std::vector<ProblemType> k_types{
-      {"validation", "Request body is not valid",
+      {"validation", "Request is not valid",
        "One or more fields are wrong; errors lists each of them with its JSON pointer."},
       {"malformed", "Request cannot be read", "The request is not well-formed JSON, CSV or HTTP."},
       {"unauthorized", "Authentication required",

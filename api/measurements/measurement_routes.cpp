@@ -1,6 +1,7 @@
 #include <nlohmann/json.hpp>
 
 #include "api/kit/reader.hpp"
+#include "api/kit/row_cursor.hpp"
 #include "api/kit/support.hpp"
 #include "api/learning/learning_json.hpp"
 #include "api/learning/measurement_query.hpp"
@@ -24,7 +25,7 @@ using Ordered = nlohmann::ordered_json;
 
 namespace {
 
-MeasurementStore::Filter filter_of(const Request& request) {
+MeasurementStore::Filter filter_of(const Request& request, MeasurementStore& store) {
   MeasurementStore::Filter filter;
   const auto page = page_query(request, 10'000);
   filter.limit = page.limit;
@@ -39,6 +40,7 @@ MeasurementStore::Filter filter_of(const Request& request) {
     throw_problem(422, "validation", "sort is t_us or -t_us",
                   {{"/sort", "unknown_value", "must be t_us or -t_us"}});
   filter.descending = sort == "-t_us";
+  check_row_cursor(store, filter);
   return filter;
 }
 
@@ -196,7 +198,7 @@ Response list_ranges(MeasurementApi& s, const Request& request) {
        "min_level_dbm", "max_level_dbm", "label",  "fix",    "class",    "predicted",      "every",
        "count"});
   const bool with_cir = query_flag(request, "cir"), with_features = query_flag(request, "features");
-  auto filter = filter_of(request);
+  auto filter = filter_of(request, s.measurements);
   filter.limits = query_limits(request);
   filter.fix = query_word(request, "fix", k_fix_words);
   filter.every = query_every(request);
@@ -240,7 +242,7 @@ Response list_ranges(MeasurementApi& s, const Request& request) {
 Response list_fixes(MeasurementApi& s, const Request& request) {
   check_query(request, {"limit", "cursor", "fields", "format", "mission", "since", "until", "sort"});
   return rows<Fix>(
-      request, filter_of(request),
+      request, filter_of(request, s.measurements),
       [&store = s.measurements](const MeasurementStore::Filter& filter) { return store.fixes(filter); },
       {[](const Fix& row, std::int64_t id) { return fix_json(row, id); },
        [](std::string& out, const Fix& row, std::int64_t id) { append_fix(out, row, id); }, append_fix_csv,

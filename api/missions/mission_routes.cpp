@@ -6,6 +6,7 @@
 #include "api/kit/current_sites.hpp"
 #include "api/kit/id_page.hpp"
 #include "api/kit/reader.hpp"
+#include "api/kit/row_cursor.hpp"
 #include "api/kit/support.hpp"
 #include "api/missions/mission_control.hpp"
 #include "api/missions/mission_json.hpp"
@@ -214,6 +215,7 @@ Response track(MissionApi& s, const Request& request) {
   filter.after = page.cursor;
   filter.since = query_time(request, "since");
   filter.until = query_time(request, "until");
+  check_row_cursor(s.measurements, filter);
   const auto rows = value_or_problem(s.measurements.fixes(filter));
   Ordered line = Ordered::array(), local = Ordered::array(), t_us = Ordered::array(), fix = Ordered::array();
   for (const auto& row : rows.rows) {

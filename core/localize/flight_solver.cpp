@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <set>
 
+#include "core/localize/clock_offset.hpp"
 #include "core/localize/flight_checks.hpp"
 #include "core/localize/flight_digest.hpp"
 #include "core/localize/flight_verdict.hpp"
@@ -132,7 +133,7 @@ std::vector<ProfileFactor> others_of(const std::vector<Work>& all, std::size_t i
 }
 
 std::string sentence(const char* format, double a, double b = 0, double c = 0) {
-  char text[400];
+  char text[600];
   std::snprintf(text, sizeof text, format, a, b, c);
   return text;
 }
@@ -145,12 +146,13 @@ void set_arm_sigma(const FlightData& flight, Work& work) {
       work.rows.track.has_attitude() || work.options.lever_arm_sigma_m)
     return;
   work.options.lever_arm_sigma_m = k_undeclared_arm_sigma_m;
-  work.rows.notes.push_back(
-      sentence("the track has no attitude and no lever arm is declared: a tag %.1f m beside the track point "
-               "would move every anchor by up to %.1f m, and no range would show it, so the regions include "
-               "%.2f m (one sigma) for it: declare the lever arm, even if it is zero, or how well it is "
-               "known (lever_arm_sigma_m)",
-               k_arm_asked_m, k_arm_asked_m, k_undeclared_arm_sigma_m));
+  work.rows.notes.push_back(sentence(
+      "the track has no attitude and no lever arm is declared: a tag %.1f m beside the track point "
+      "would move every anchor by up to %.1f m, heights by more where it turned with the course, and no "
+      "range would show it, so the regions include "
+      "%.2f m (one sigma) for it: declare the lever arm, even if it is zero, or how well it is "
+      "known (lever_arm_sigma_m)",
+      k_arm_asked_m, k_arm_asked_m, k_undeclared_arm_sigma_m));
 }
 
 /// What of the given knowledge about the kit was not used, for people.
@@ -406,6 +408,7 @@ Result<std::vector<FlightSolution>> solve_flights(std::span<const FlightData* co
     Work& work = all[i];
     BOOST_OUTCOME_TRY(const auto arm, check_lever_arm(work.rows, work.fit, work.prior, work.options));
     if (arm) work.checks.push_back(*arm);
+    if (const auto clock = check_clock(work.rows, work.fit)) work.checks.push_back(*clock);
     add_arm_doubt(work.rows, work.prior, work.options, work.fit);
     work.unseen_arm = unseen_arm_gates(work.rows, work.fit, work.prior, work.options);
     BOOST_OUTCOME_TRY(ask_scale(work));

@@ -9,6 +9,7 @@
 
 #include "core/localize/chi_square.hpp"
 #include "core/localize/flight_checks.hpp"
+#include "core/localize/widen.hpp"
 
 namespace anchord {
 namespace {
@@ -17,12 +18,18 @@ constexpr int k_directions = 24;  // of the error in the body, over half a turn:
 // Sigmas of the flight below which an error of the arm passes. Solved again with the arm free a flight tells
 // more than this linear step: what is found beyond k_arm_z there is beyond about three here.
 constexpr double k_unseen_z = 3.0;
+constexpr double k_course_s = 0.5;     // the course is that of a second
+constexpr double k_least_way_m = 0.1;  // slower than 0.1 m/s there is no course
+
+using AnchorByArm = Eigen::Matrix<double, 4, 2>;
+/// For each heading that is asked, for each anchor.
+using HeadingResponses = std::vector<std::vector<AnchorByArm>>;
 
 /// How a fit with the arm held answers to an arm that is wrong, per metre forward and left.
 struct ArmResponse {
   Eigen::Matrix<double, k_shared_size, 2> shared;
   Eigen::Matrix2d information_per_m2;  ///< what the flight says about the arm
-  std::vector<Eigen::Matrix<double, 4, 2>> anchors{};
+  std::vector<AnchorByArm> anchors{};
 };
 
 ArmResponse response_of(const JointFit& fit, const SharedPrior& prior) {
@@ -35,6 +42,65 @@ ArmResponse response_of(const JointFit& fit, const SharedPrior& prior) {
     out.anchors.emplace_back(block.own_inverse *
                              (block.shared.middleCols<2>(k_shared_forward) - block.shared * out.shared));
   return out;
+}
+
+/// Headings that an aircraft without attitude may have had, about a constant.
+enum class Heading : std::uint8_t { along_course, to_middle };
+
+/// Direction in the plane at an instant; zero where there is none. middle_m  of the track
+Eigen::Vector3d direction_at(const FlightRows& flight, Heading heading, const Eigen::Vector3d& antenna_m,
+                             const Eigen::Vector3d& middle_m, double t_s) {
+  Eigen::Vector3d way = middle_m - antenna_m;
+  if (heading == Heading::along_course) {
+    const TagPoint before = flight.track.at(t_s - k_course_s), after = flight.track.at(t_s + k_course_s);
+    if (before.refused != TrackRefusal::none || after.refused != TrackRefusal::none)
+      return Eigen::Vector3d::Zero();
+    way = after.position_m - before.position_m;
+  }
+  way.z() = 0;
+  const double length_m = way.norm();
+  return length_m > k_least_way_m ? Eigen::Vector3d(way / length_m) : Eigen::Vector3d::Zero();
+}
+
+/// How the fit would answer to an arm that turned with a heading which the track does not have.
+std::vector<AnchorByArm> response_with(Heading heading, const FlightRows& flight, const JointFit& fit,
+                                       const SharedPrior& prior, const FlightOptions& options) {
+  Eigen::Vector3d middle_m = Eigen::Vector3d::Zero();
+  for (const TrackPose& pose : flight.track.poses()) middle_m += pose.position_m;
+  middle_m /= static_cast<double>(flight.track.poses().size());
+  std::vector<AnchorByArm> own(flight.anchors.size(), AnchorByArm::Zero());
+  Eigen::Matrix<double, k_shared_size, 2> shared = Eigen::Matrix<double, k_shared_size, 2>::Zero();
+  for (std::size_t i = 0; i < own.size(); ++i) {
+    const AnchorBlock& block = fit.normal.anchors[i];
+    if (!fit.state.anchors[i].active || !(block.scale_m > 0)) continue;
+    for (const JointRow& row : flight.anchors[i].rows) {
+      const JointLine line = linearise(flight.track, row, fit.state.shared, fit.state.anchors[i]);
+      if (line.refused != TrackRefusal::none) continue;
+      const double weight = robust_weight(line.residual_m / block.scale_m, options) /
+                            (block.kappa * block.scale_m * block.scale_m);
+      const Eigen::Vector3d forward =
+          direction_at(flight, heading, line.antenna_m, middle_m, row.t_s + fit.state.shared[k_shared_lag]);
+      // By the antenna the range changes as by the anchor, with the other sign.
+      const Eigen::Vector3d by_antenna = -line.by_anchor.head<3>();
+      const Eigen::RowVector2d by_arm(by_antenna.dot(forward),
+                                      by_antenna.dot(Eigen::Vector3d::UnitZ().cross(forward)));
+      own[i] += weight * line.by_anchor * by_arm;
+      shared += weight * line.by_shared * by_arm;
+    }
+    shared -= block.shared.transpose() * block.own_inverse * own[i];
+  }
+  const Eigen::Matrix<double, k_shared_size, 2> moved =
+      (fit.normal.reduced + prior.information).ldlt().solve(shared);
+  for (std::size_t i = 0; i < own.size(); ++i)
+    own[i] = fit.normal.anchors[i].own_inverse * (own[i] - fit.normal.anchors[i].shared * moved);
+  return own;
+}
+
+/// The same of every anchor for each heading that is asked.
+HeadingResponses responses_without_heading(const FlightRows& flight, const JointFit& fit,
+                                           const SharedPrior& prior, const FlightOptions& options) {
+  return {response_with(Heading::along_course, flight, fit, prior, options),
+          response_with(Heading::to_middle, flight, fit, prior, options)};
 }
 
 /// The largest error in a direction of the body that the flight would not show.
@@ -53,17 +119,28 @@ double unapplied_m(const FlightRows& flight) {
   return most_m;
 }
 
+Eigen::Vector2d way_of(int direction) {
+  const double angle_rad = direction * std::numbers::pi / k_directions;
+  return {std::cos(angle_rad), std::sin(angle_rad)};
+}
+
 /// Moves of one anchor by the errors that nothing shows, one a column.
-std::vector<Eigen::Vector3d> moves_of(const Eigen::Matrix<double, 4, 2>& per_metre, const ArmResponse& arm,
-                                      double unapplied) {
+std::vector<Eigen::Vector3d> moves_of(const AnchorByArm& per_metre, const ArmResponse& arm) {
+  std::vector<Eigen::Vector3d> moves;
+  for (int k = 0; k < k_directions; ++k)
+    moves.emplace_back((per_metre * unseen_m(way_of(k), arm.information_per_m2)).head<3>());
+  return moves;
+}
+
+/// The same by an arm across that was not applied: at one heading its length in the plane, at one that
+/// turns also the height, which a range from the side hardly tells.
+std::vector<Eigen::Vector3d> moves_of(std::size_t anchor, const HeadingResponses& responses,
+                                      double unapplied_m) {
   std::vector<Eigen::Vector3d> moves;
   for (int k = 0; k < k_directions; ++k) {
-    const double angle_rad = k * std::numbers::pi / k_directions;
-    const Eigen::Vector2d way(std::cos(angle_rad), std::sin(angle_rad));
-    if (unapplied > 0)
-      moves.emplace_back(unapplied * way.x(), unapplied * way.y(), 0.0);
-    else
-      moves.emplace_back((per_metre * unseen_m(way, arm.information_per_m2)).head<3>());
+    const Eigen::Vector2d arm_m = unapplied_m * way_of(k);
+    moves.emplace_back(arm_m.x(), arm_m.y(), 0.0);
+    for (const auto& of : responses) moves.emplace_back((of[anchor] * arm_m).head<3>());
   }
   return moves;
 }
@@ -89,9 +166,9 @@ std::string why(const Reach& worst, double unapplied) {
   if (unapplied > 0)
     std::snprintf(
         text, sizeof text,
-        "the track has no heading, so %.2f m of the horizontal lever arm are not applied: record the "
-        "attitude, or mount the tag below the antenna",
-        unapplied);
+        "the track has no heading, so %.2f m of the horizontal lever arm are not applied and may move it by "
+        "%.2f m: record the attitude, or mount the tag below the antenna",
+        unapplied, worst.moved_m);
   else if (worst.regions <= 1.0)
     std::snprintf(text, sizeof text,
                   "a lever arm that is wrong by up to %.1f m shows in the ranges, or moves it by at most "
@@ -112,16 +189,23 @@ std::string why(const Reach& worst, double unapplied) {
 void add_arm_doubt(const FlightRows& flight, const SharedPrior& prior, const FlightOptions& options,
                    JointFit& fit) {
   if (!options.lever_arm_sigma_m) return;
+  const double sigma_m = *options.lever_arm_sigma_m;
+  const bool has_attitude = flight.track.has_attitude();
   const ArmResponse arm = response_of(fit, prior);
-  const double variance_m2 = *options.lever_arm_sigma_m * *options.lever_arm_sigma_m;
-  const Eigen::Matrix4d in_plane = Eigen::Vector4d(1, 1, 0, 0).asDiagonal();
+  const auto turning =
+      has_attitude ? HeadingResponses{} : responses_without_heading(flight, fit, prior, options);
+  const Eigen::Matrix4d in_plane_m2 = sigma_m * sigma_m * Eigen::Vector4d(1, 1, 0, 0).asDiagonal();
   for (std::size_t i = 0; i < fit.anchor_covariance.size(); ++i) {
-    const Eigen::Matrix4d arm_m2 =
-        variance_m2 * (flight.track.has_attitude()
-                           ? Eigen::Matrix4d(arm.anchors[i] * arm.anchors[i].transpose())
-                           : in_plane);
-    fit.anchor_covariance[i] += arm_m2;
-    fit.arm_covariance_m2.emplace_back(arm_m2.topLeftCorner<3, 3>());
+    const Eigen::Matrix4d before_m2 = fit.anchor_covariance[i];
+    Eigen::Matrix4d& now_m2 = fit.anchor_covariance[i];
+    if (has_attitude)
+      now_m2 += sigma_m * sigma_m * (arm.anchors[i] * arm.anchors[i].transpose());
+    else
+      now_m2 += in_plane_m2;
+    for (const auto& of : turning) {
+      for (int k = 0; k < k_directions; ++k) reach(of[i] * (sigma_m * way_of(k)), options.dims, now_m2);
+    }
+    fit.arm_covariance_m2.emplace_back((now_m2 - before_m2).topLeftCorner<3, 3>());
   }
 }
 
@@ -132,11 +216,14 @@ std::vector<Gate> unseen_arm_gates(const FlightRows& flight, const JointFit& fit
   // How well an arm is measured says nothing of one that is not applied.
   if (unapplied <= 0 && (options.lever_arm_sigma_m || !flight.track.has_attitude())) return {};
   const ArmResponse arm = response_of(fit, prior);
+  const auto turning =
+      unapplied > 0 ? responses_without_heading(flight, fit, prior, options) : HeadingResponses{};
   std::vector<Gate> gates;
   for (std::size_t i = 0; i < flight.anchors.size(); ++i) {
     Eigen::Matrix3d covariance_m2 = fit.anchor_covariance[i].topLeftCorner<3, 3>();
     covariance_m2.diagonal().array() += options.floor_sigma_m * options.floor_sigma_m;
-    const Reach worst = worst_of(moves_of(arm.anchors[i], arm, unapplied), covariance_m2, options.dims);
+    const auto moves = unapplied > 0 ? moves_of(i, turning, unapplied) : moves_of(arm.anchors[i], arm);
+    const Reach worst = worst_of(moves, covariance_m2, options.dims);
     gates.push_back({"unseen_arm", worst.moved_m, worst.regions > 0 ? worst.moved_m / worst.regions : 0.0,
                      worst.regions <= 1.0, why(worst, unapplied)});
   }

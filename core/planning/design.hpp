@@ -9,6 +9,8 @@
 
 namespace anchord::planning {
 
+inline constexpr double k_furthest_corner_m = 2000;  ///< of an outline from the origin: no building is larger
+
 /// How one point sees one anchor: the row of the linear model and what the building does to it.
 struct Sight {
   Eigen::Vector4d row{0, 0, 0, 0};  ///< unit vector and 1 for the bias; zero: no range

@@ -281,7 +281,7 @@ Result<FlightPlan> plan_flight(const FlightPlanInput& input, const FlightPlanOpt
   if (input.outline.size() < 3)
     return make_error(Errc::invalid_argument, "an outline needs at least three corners");
   for (const auto& corner : input.outline) {
-    if (!corner.allFinite() || corner.norm() > 2000) {
+    if (!corner.allFinite() || corner.norm() > k_furthest_corner_m) {
       return make_error(Errc::invalid_argument, "a corner of the outline is more than 2 km from its middle");
     }
   }

@@ -16,7 +16,7 @@ namespace anchord::planning {
 namespace {
 
 std::string with_numbers(const char* format, double a, double b = 0) {
-  std::array<char, 160> out{};
+  std::array<char, 240> out{};
   std::snprintf(out.data(), out.size(), format, a, b);
   return out.data();
 }
@@ -54,9 +54,15 @@ std::vector<Eigen::Vector3d> anchors_inside(const LocalPlan& plan, const FlightP
     low = low.cwiseMin(c);
     high = high.cwiseMax(c);
   }
+  // Of a large outline all but max_anchors are left out again: a wider grid, or it is the number of its
+  // places that takes minutes.
+  const double most_places = 64.0 * options.max_anchors;
+  const Eigen::Vector2d size_m = high - low;
+  const double spacing_m =
+      std::max(options.anchor_spacing_m, std::sqrt(size_m.x() * size_m.y() / most_places));
   for (double up = std::min(2.5, height_m / 2); up < height_m; up += options.floor_m) {
-    for (double x = low.x() + 1; x < high.x(); x += options.anchor_spacing_m) {
-      for (double y = low.y() + 1; y < high.y(); y += options.anchor_spacing_m) {
+    for (double x = low.x() + 1; x < high.x(); x += spacing_m) {
+      for (double y = low.y() + 1; y < high.y(); y += spacing_m) {
         if (contains(plan.outline, {x, y})) out.emplace_back(x, y, up);
       }
     }
@@ -204,6 +210,14 @@ Result<PlanCheck> check_plan(const Plan& plan) {
   if (local.outline.empty()) {
     report(Severity::warning, "no_outline", "/outline",
            "no outline is drawn: nothing keeps the aircraft away from the building");
+  }
+  double furthest_m = 0;
+  for (const auto& corner : local.outline) furthest_m = std::max(furthest_m, corner.norm());
+  if (furthest_m > k_furthest_corner_m) {
+    report(Severity::error, "too_far", "/outline",
+           with_numbers("a corner of the outline is %.0f m from the origin of the plan, the limit is %.0f m: "
+                        "are longitude and latitude swapped, or is the origin another site's?",
+                        furthest_m, k_furthest_corner_m));
   }
   for (std::size_t i = 0; i < local.waypoints_m.size(); ++i) {
     const std::string pointer = "/waypoints/" + std::to_string(i);

@@ -1,5 +1,9 @@
 // Files of published anchors: what is in them, and which are refused. GDAL reads each in
 // tests/e2e/neighbours.test.mjs.
+#include <algorithm>
+#include <span>
+
+#include "api/exchange/anchor_tables.hpp"
 #include "api/exchange/step_text.hpp"
 #include "app_fixture.hpp"
 
@@ -119,6 +123,26 @@ TEST_F(AnchorFiles, AreRefusedWhereAnAnchorWouldBeMissing) {
   }
   EXPECT_EQ(file("kml").status, 200) << "needs neither map nor frame";
   EXPECT_EQ(file("gpkg").status, 200);
+}
+
+TEST_F(AnchorFiles, AnEllipseOverTheDateLineGoesOnBeyond180DegreesAndNotRoundTheGlobe) {
+  api::AnchorFeature beside;
+  beside.estimate.emplace();
+  beside.estimate->best.emplace();
+  beside.estimate->best->wgs84 = Wgs84{-17.8, 180.0 - 1e-9, 12};
+  beside.estimate->best->covariance_m2 = Eigen::Vector3d(0.04, 0.04, 0.1).asDiagonal();
+  const auto tables = api::anchor_tables(std::span(&beside, 1), database_->stores().missions,
+                                         database_->stores().measurements);
+  const auto ellipses = std::ranges::find(tables, "ellipses95", &FeatureTable::name);
+  ASSERT_NE(ellipses, tables.end());
+  ASSERT_EQ(ellipses->rows.size(), 1u);
+  double west_deg = 400, east_deg = -400;
+  for (const auto& corner : ellipses->rows[0].vertices) {
+    west_deg = std::min(west_deg, corner.x());
+    east_deg = std::max(east_deg, corner.x());
+  }
+  // A sigma of 0.2 m on every side: 0.49 m with 95 %, and a degree of longitude has 106 km there.
+  EXPECT_NEAR(east_deg - west_deg, 2 * 0.49 / 106'000, 1e-6);
 }
 
 TEST_F(AnchorFiles, DoNotGuessAHeight) {

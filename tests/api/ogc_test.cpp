@@ -46,6 +46,17 @@ TEST_F(Ogc, ABoxHoldsWhatIsInItAlsoAcrossTheAntimeridianAndBetweenHeights) {
   EXPECT_EQ(items("anchors", {{"bbox", "5,51,6,52"}})["numberMatched"], 0);
 }
 
+TEST_F(Ogc, ABoxAcrossTheAntimeridianHoldsTheSameForAnchorsAndTheirFiles) {
+  publish();
+  const Query across{{"bbox", "179,-18,-179,-17"}};
+  EXPECT_EQ(anchors(json(get("/api/v1/anchors", across))), Names{"0x6a3c"});
+  EXPECT_EQ(anchors(json(get("/api/v1/exports/anchors.geojson", across))), Names{"0x6a3c"});
+  EXPECT_EQ(anchors(json(get("/api/v1/anchors", {{"bbox", "3,51,4,52"}}))), Names{"0x6a2f"});
+  const auto upside_down = get("/api/v1/anchors", {{"bbox", "3,52,4,51"}});
+  EXPECT_EQ(upside_down.status, 422);
+  EXPECT_EQ(json(upside_down)["errors"][0]["pointer"], "/bbox");
+}
+
 TEST_F(Ogc, CoordinatesComeInTheOrderOfTheSystemThatWasAskedFor) {
   publish();
   const std::string point = "/ogc/collections/anchors/items/0x6a2f";

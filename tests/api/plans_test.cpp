@@ -136,6 +136,21 @@ TEST_F(Plans, ADrawnPlanIsJudgedAsAStoredOneAndNothingIsStored) {
   EXPECT_EQ(post("/api/v1/plans/validate", R"({"name":"x","outlin":null})").status, 422);
 }
 
+// One corner at 0, 0: it kept a worker busy for minutes, as a grid of places inside was made first.
+TEST_F(Plans, WithACornerOnAnotherContinentIsJudgedAtOnceAndNotFlyable) {
+  Json drawn = hall();
+  drawn["outline"]["coordinates"][0][1] = {0, 0};
+  const auto checked = post("/api/v1/plans/validate", drawn.dump());
+  ASSERT_EQ(checked.status, 200) << checked.body;
+  EXPECT_FALSE(json(checked)["flyable"].get<bool>());
+  const auto issues = json(checked)["issues"];
+  const auto far =
+      std::find_if(issues.begin(), issues.end(), [](const Json& i) { return i["code"] == "too_far"; });
+  ASSERT_NE(far, issues.end()) << issues;
+  EXPECT_EQ((*far)["pointer"], "/outline");
+  EXPECT_THAT((*far)["text"].get<std::string>(), ::testing::HasSubstr("limit is 2000 m"));
+}
+
 TEST_F(Plans, GenerateFliesRoundTheOutlineWithoutAnyWaypointSet) {
   Json plan = hall();
   plan.erase("waypoints");

@@ -97,6 +97,20 @@ TEST_F(Resources, RefuseUnknownQueryParametersAndLimits) {
   EXPECT_EQ(get("/api/v1/missions", {{"cursor", "zzz"}}).status, 422);
 }
 
+// As CSV it was 200 and then cut off.
+TEST_F(Resources, NameTheCursorThatIsNoneInEveryFormat) {
+  const auto mission =
+      json(post("/api/v1/missions", R"({"name":"A","frame":"local","track_point":"body"})"))["id"];
+  const auto refused = {get("/api/v1/ranges", {{"cursor", "x"}}),
+                        get("/api/v1/ranges", {{"cursor", "x"}, {"format", "csv"}}),
+                        get("/api/v1/fixes", {{"cursor", "1.x"}, {"format", "ndjson"}}),
+                        get("/api/v1/missions/" + mission.get<std::string>() + "/track", {{"cursor", "-"}})};
+  for (const auto& answer : refused) {
+    ASSERT_EQ(answer.status, 422) << answer.body;
+    EXPECT_EQ(json(answer)["errors"][0]["pointer"], "/cursor") << answer.body;
+  }
+}
+
 TEST_F(Resources, ChangeASiteOnlyWithTheEtagThatWasRead) {
   const auto made = post("/api/v1/sites", R"({"name":"Ghent","origin":{"lon":3.7,"lat":51.0,"h_m":55}})");
   ASSERT_EQ(made.status, 201) << made.body;

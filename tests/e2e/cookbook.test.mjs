@@ -76,6 +76,7 @@ test('every block of the tutorial may be pasted as it stands, twice', async () =
       { cwd, env: process.env },
     );
     assert.equal(code, 0, output.slice(-4000));
+    assert.match(output, /^0x6a21\tok\ttrue$/m, 'verdict and whether it may be believed');
   } finally {
     rmSync(cwd, { recursive: true, force: true });
   }

@@ -2,7 +2,7 @@
 import type { Gate } from '../api/anchors';
 import { fixed } from './format';
 
-type Unit = 'm' | '%' | '×' | 'χ²' | 'σ' | '';
+type Unit = 'm' | 's' | '%' | '×' | 'χ²' | 'σ' | '';
 interface Words {
   readonly passes: string;
   readonly fails: string;
@@ -51,6 +51,11 @@ const WORDS: Record<string, Words> = {
   moved: { passes: 'Same position as before', fails: 'It has moved, or one of the positions is wrong', unit: 'χ²' },
   bias: { passes: 'Range bias of the kit is known, σ', fails: 'Range bias of the kit is not known, σ', unit: 'm' },
   lever_arm: { passes: 'The lever arm fits the flight', fails: 'The lever arm does not fit the flight', unit: 'σ' },
+  clock: {
+    passes: 'The ranges fit the track at their times',
+    fails: 'The clock of the ranges or of the track is off',
+    unit: 's',
+  },
   unseen_arm: {
     passes: 'A wrong lever arm would show or stay within the region, unseen error',
     fails: 'A wrong lever arm would not show: the aircraft turned too little, unseen error',
