@@ -114,9 +114,11 @@ test('in flight, with control in other hands, every command and value can be rea
       await page.setViewportSize({ width, height });
       await page.evaluate(() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done))));
       assert.deepEqual(await unreadable(page), [], `${theme}, ${name}`);
-      for (const command of ['cmd-hold', 'cmd-skip', 'cmd-return', 'cmd-land']) {
-        const box = await id(command).boundingBox();
-        assert.ok(box.width >= 72 && box.height >= 44, `${command} is ${box.width} x ${box.height}, ${theme}, ${name}`);
+      const commands = await id('commands').locator('> .cmd').all();
+      assert.equal(commands.length, 4, `${theme}, ${name}`);
+      for (const command of commands) {
+        const box = await command.boundingBox();
+        assert.ok(box.width >= 72 && box.height >= 44, `${box.width} x ${box.height} of a command, ${theme}, ${name}`);
       }
       await picture(page, `in-other-hands-${theme}-${name}`);
     }
