@@ -45,6 +45,30 @@ const places = (page) =>
   });
 const alarmed = (page) => page.locator('.alarm.first').count();
 
+test('in flight, with control in other hands, every command and value can be read at every size, in sun too', async () => {
+  const control = (json) => server.fetch(`/api/v1/missions/${mission}/control`, { json });
+  const { lease } = await (await control({ action: 'take' })).json();
+  assert.ok(lease);
+  for (const theme of ['light', 'sun']) {
+    const { page, id } = await openPage(browser, server, { theme });
+    await id('take-anyway').waitFor({ timeout: 20_000 });
+    for (const [name, width, height] of sizes) {
+      await page.setViewportSize({ width, height });
+      await page.evaluate(() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done))));
+      assert.deepEqual(await unreadable(page), [], `${theme}, ${name}`);
+      const commands = await id('commands').locator('> .cmd').all();
+      assert.equal(commands.length, 4, `${theme}, ${name}`);
+      for (const command of commands) {
+        const box = await command.boundingBox();
+        assert.ok(box.width >= 72 && box.height >= 44, `${box.width} x ${box.height} of a command, ${theme}, ${name}`);
+      }
+      await picture(page, `in-other-hands-${theme}-${name}`);
+    }
+    await page.close();
+  }
+  await control({ action: 'release', lease });
+});
+
 test('in flight no command, tile or view moves when alarms come, are several, are read, and go', async () => {
   const open = [];
   for (const [name, width, height] of sizes)
@@ -101,28 +125,6 @@ test('in flight no command, tile or view moves when alarms come, are several, ar
   for (const { id } of open) await id('alarm-link.lost').waitFor({ state: 'detached', timeout: 20_000 });
   await same('the link is back');
   for (const { page } of open) await page.close();
-});
-
-test('in flight, with control in other hands, every command and value can be read at every size, in sun too', async () => {
-  const control = (json) => server.fetch(`/api/v1/missions/${mission}/control`, { json });
-  const { lease } = await (await control({ action: 'take' })).json();
-  assert.ok(lease);
-  for (const theme of ['light', 'sun']) {
-    const { page, id } = await openPage(browser, server, { theme });
-    await id('take-anyway').waitFor({ timeout: 20_000 });
-    for (const [name, width, height] of sizes) {
-      await page.setViewportSize({ width, height });
-      await page.evaluate(() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done))));
-      assert.deepEqual(await unreadable(page), [], `${theme}, ${name}`);
-      for (const command of ['cmd-hold', 'cmd-skip', 'cmd-return', 'cmd-land']) {
-        const box = await id(command).boundingBox();
-        assert.ok(box.width >= 72 && box.height >= 44, `${command} is ${box.width} x ${box.height}, ${theme}, ${name}`);
-      }
-      await picture(page, `in-other-hands-${theme}-${name}`);
-    }
-    await page.close();
-  }
-  await control({ action: 'release', lease });
 });
 
 test('in every view the line has its place, at every size, with and without an alarm', async () => {

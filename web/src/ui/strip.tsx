@@ -330,7 +330,7 @@ export function Strip() {
               <span class="tl">{LABELS[k]}</span>
               <span class="tv">
                 <Mark shape={r.shape} />
-                <b>{r.word}</b>
+                <b title={r.word}>{r.word}</b>
               </span>
               <span class="te">{r.extra}</span>
             </button>

@@ -185,7 +185,7 @@ export function AuditPanel() {
           <caption class="sr">What was done, newest first</caption>
           <thead>
             <tr>
-              <th scope="col">When</th>
+              <th scope="col">When, UTC</th>
               <th scope="col">Who</th>
               <th scope="col">What</th>
               <th scope="col">Result</th>

@@ -219,6 +219,12 @@ function DatumForm({ site, done, close }: { site: Site | null; done: () => void;
     [problem, set_problem] = useState('');
   const number = (s: string): number | null => (s.trim() === '' ? null : Number(s.replace(',', '.')));
   const send = async (): Promise<void> => {
+    const wrong = [
+      ['Epoch', epoch, '2026.34'],
+      ['σ of its position', sigma, '8'],
+    ].find(([, typed]) => Number.isNaN(number(typed!)));
+    if (wrong)
+      return set_problem(`${wrong[0]}: “${wrong[1]}” is not a number. Write it without a unit, like ${wrong[2]}.`);
     const mm = number(sigma),
       d = { frame: frame.trim(), epoch: number(epoch), source, sigma_m: mm === null ? null : mm / 1000 };
     try {
