@@ -63,9 +63,9 @@ void disk_alarms(const Status& s, std::vector<Alarm>& out) {
     out.push_back({"gateway.disk", "the disk has " + mib(s.disk_free_bytes) + " left (limit " +
                                        mib(k_little_disk_bytes) + "): free some"});
   if (s.rows_dropped > 0)
-    out.push_back({"gateway.rows_lost",
-                   std::to_string(s.rows_dropped) + " rows were lost while the outbox could not store them; "
-                                                    "'anchord replay' restores them from the recording"});
+    out.push_back({"gateway.rows_lost", std::to_string(s.rows_dropped) +
+                                            " rows were lost while the outbox could not store them; "
+                                            "'anchord replay' restores them from the recording"});
   if (!s.recorder_failure.empty())
     out.push_back({"gateway.recording", "raw bytes are not recorded: " + s.recorder_failure});
 }

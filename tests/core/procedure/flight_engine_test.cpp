@@ -501,8 +501,8 @@ TEST(FlightEngine, EveryExpectedAnchorIsDoneOnlyWhenItIs) {
     EXPECT_EQ(f.engine.state().step, second_is_expected ? Step::go_to_waypoint : Step::return_home)
         << f.engine.state().reason;
     const std::string which = second_is_expected ? "received" : "expected";
-    EXPECT_NE(f.engine.state().reason.find("every " + which +
-                                           " anchor is done or given up; 1 without the accuracy"),
+    EXPECT_NE(f.engine.state().reason.find(
+                  "every " + which + " anchor is done or given up; 1 without reaching the target accuracy"),
               std::string::npos)
         << "its one point is over, its accuracy was not reached: " << f.engine.state().reason;
   }
