@@ -43,8 +43,9 @@ TEST(ClockOffset, OfGpsTimeAgainstUtcIsNamedAndHoldsEveryAnchorBack) {
 
 TEST(ClockOffset, IsFoundToATenthOfASecondUpToAMinute) {
   for (const double offset_s : {2.5, -7.3, 41.7}) {
-    const FlightSolution solution =
-        solve_flight(with_clock_off(MadeFlight{.duration_s = 300}, offset_s)).value();
+    MadeFlight made;
+    made.duration_s = 300;
+    const FlightSolution solution = solve_flight(with_clock_off(made, offset_s)).value();
     char expected[40];
     std::snprintf(expected, sizeof expected, "%.1f s %s their times", std::abs(offset_s),
                   offset_s > 0 ? "before" : "after");
