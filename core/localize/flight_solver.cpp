@@ -311,6 +311,24 @@ FlightSolution describe(Work& work, const FlightData& flight) {
   return solution;
 }
 
+/// What is asked of a flight as a whole, after all of them are solved.
+Result<void> check_flight(const FlightData& flight, std::vector<Work>& all, std::size_t i,
+                          const FlightOptions& options) {
+  Work& work = all[i];
+  BOOST_OUTCOME_TRY(const auto arm, check_lever_arm(work.rows, work.fit, work.prior, work.options));
+  if (arm) work.checks.push_back(*arm);
+  if (const auto clock = check_clock(work.rows, work.fit)) work.checks.push_back(*clock);
+  add_arm_doubt(work.rows, work.prior, work.options, work.fit);
+  work.unseen_arm = unseen_arm_gates(work.rows, work.fit, work.prior, work.options);
+  BOOST_OUTCOME_TRY(ask_scale(work));
+  ask_shift(flight, work);
+  if (work.rows.step_share > 0) work.checks.push_back(check_steps(work.rows.step_share, options));
+  const auto others = others_of(all, i, options);
+  if (!others.empty() && !options.fixed_bias_m)
+    work.checks.push_back(check_profile(work.alone, others, options));
+  return boost::outcome_v2::success();
+}
+
 }  // namespace
 
 Result<void> FlightOptions::check() const {
@@ -405,18 +423,7 @@ Result<std::vector<FlightSolution>> solve_flights(std::span<const FlightData* co
                                 "side are too long: an obstacle there may lengthen them");
   }
   for (std::size_t i = 0; i < all.size(); ++i) {
-    Work& work = all[i];
-    BOOST_OUTCOME_TRY(const auto arm, check_lever_arm(work.rows, work.fit, work.prior, work.options));
-    if (arm) work.checks.push_back(*arm);
-    if (const auto clock = check_clock(work.rows, work.fit)) work.checks.push_back(*clock);
-    add_arm_doubt(work.rows, work.prior, work.options, work.fit);
-    work.unseen_arm = unseen_arm_gates(work.rows, work.fit, work.prior, work.options);
-    BOOST_OUTCOME_TRY(ask_scale(work));
-    ask_shift(*flights[i], work);
-    if (work.rows.step_share > 0) work.checks.push_back(check_steps(work.rows.step_share, options));
-    const auto others = others_of(all, i, options);
-    if (!others.empty() && !options.fixed_bias_m)
-      work.checks.push_back(check_profile(work.alone, others, options));
+    BOOST_OUTCOME_TRY(check_flight(*flights[i], all, i, options));
   }
   if (profile) {
     profile->kit = all.empty() ? "" : all.front().kit;

@@ -241,7 +241,7 @@ Section queues(const TopDocuments& documents, std::size_t width) {
     const char* what;
     const char* metric;
   };
-  constexpr Queue k_queues[]{{"of these, rows waiting for the live estimates", "anchord_live_queue_rows"},
+  constexpr Queue k_queues[]{{"of these, rows for live estimates", "anchord_live_queue_rows"},
                              {"commands", "anchord_command_queue"},
                              {"requests", "anchord_worker_queue"},
                              {"computations", "anchord_heavy_queue"}};

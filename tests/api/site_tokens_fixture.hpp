@@ -11,8 +11,8 @@
 namespace anchord::test {
 
 /// Two firms on one server: each has a site, a token bound to it with every role, and of everything that can
-/// be made of a site one, made with that token. What is of the first carries "alpha" in its names, what is of
-/// the second "bravo".
+/// be made of a site one, made with that token. What is of the first carries "alfa" in its names ("alpha"
+/// stands in every style of a map), what is of the second "bravo".
 class SiteTokens : public AppFixture {
  protected:
   using Method = api::Method;
@@ -27,7 +27,7 @@ class SiteTokens : public AppFixture {
 
   void SetUp() override {
     AppFixture::SetUp();
-    alpha_ = firm("alpha", 0xa1a1);
+    alpha_ = firm("alfa", 0xa1a1);
     bravo_ = firm("bravo", 0xb2b2);
   }
 
@@ -107,7 +107,10 @@ class SiteTokens : public AppFixture {
              Json{{"name", word + " crew"}, {"roles", {"admin"}}, {"sites", {ids["site"]}}}.dump());
     EXPECT_EQ(token.status, 201) << token.body;
     out.who = access_->verify(json(token)["token"].get<std::string>()).value();
-    const Json mission{{"name", word + " flight"}, {"site", ids["site"]}, {"track_point", "tag_antenna"}};
+    const Json mission{{"name", word + " flight"},
+                       {"site", ids["site"]},
+                       {"frame", "wgs84"},
+                       {"track_point", "tag_antenna"}};
     ids["mission"] = made(out, "/api/v1/missions", mission);
     ids["plan"] = made(out, "/api/v1/plans", plan(word, ids["site"]));
     ids["building"] = made(out, "/api/v1/buildings", {{"name", word + " hall"}, {"site", ids["site"]}});

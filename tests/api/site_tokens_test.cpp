@@ -199,7 +199,12 @@ TEST_F(SiteTokenRoutes, ListsExportsAndDocumentsHoldNothingOfAnotherSite) {
 TEST_F(SiteTokenRoutes, PagesAreFullAndEndWithTheLastOfItsOwn) {
   for (int i = 0; i < 3; ++i) {
     for (const auto* firm : {&alpha_, &bravo_})
-      ASSERT_EQ(post_as(*firm, "/api/v1/missions", {{"name", firm->word}, {"site", firm->id("site")}}).status,
+      ASSERT_EQ(post_as(*firm, "/api/v1/missions",
+                        {{"name", firm->word},
+                         {"site", firm->id("site")},
+                         {"frame", "wgs84"},
+                         {"track_point", "tag_antenna"}})
+                    .status,
                 201);
   }
   const auto first = json(get_as(bravo_, "/api/v1/missions", {{"limit", "3"}}));
@@ -269,9 +274,10 @@ TEST_F(SiteTokenRoutes, WhatIsMadeWithoutASiteIsOfTheOneThatTheTokenIsBoundTo) {
   Firm both = bravo_;
   both.who.sites = SiteSet::only(
       {SiteId{parse_uuid(alpha_.id("site")).value()}, SiteId{parse_uuid(bravo_.id("site")).value()}});
-  for (const auto& [path, body] : std::map<std::string, Json>{{"/api/v1/missions", {{"name", "x"}}},
-                                                              {"/api/v1/frames", {{"name", "x"}}},
-                                                              {"/api/v1/plans", plan}}) {
+  for (const auto& [path, body] : std::map<std::string, Json>{
+           {"/api/v1/missions", {{"name", "x"}, {"frame", "wgs84"}, {"track_point", "tag_antenna"}}},
+           {"/api/v1/frames", {{"name", "x"}}},
+           {"/api/v1/plans", plan}}) {
     EXPECT_EQ(post_as(both, path, body).status, 422) << path << ": of which of the two?";
     const auto made = post_as(bravo_, path, body);
     ASSERT_EQ(made.status, 201) << path << ' ' << made.body;

@@ -1,4 +1,5 @@
-// What axe finds, in every view, every theme and every size: nothing, the sizes of targets among it; and that all of it can be read. One server with something in each view.
+// What axe finds, in every view, every theme and every size: nothing, the sizes of targets among it; and that all of it can be read.
+// One server with something in each view.
 import assert from 'node:assert/strict';
 import { after, before, test } from 'node:test';
 import { openBrowser, openPage, picture, text, unreadable, violations } from './browser.mjs';

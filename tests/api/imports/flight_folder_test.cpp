@@ -169,7 +169,7 @@ TEST_F(FlightFolder, RefusesBrokenJsonDeepJsonAndMissingFiles) {
   write("flight.json", std::string(5000, '[') + std::string(5000, ']'));
   expect_error("flight.json");
   fs::remove(folder_ / "flight.json");
-  expect_error("flight.json: not there");
+  expect_error("flight.json: does not exist");
   globe();
   fs::remove(folder_ / "track.csv");
   expect_error("neither track.csv nor track.csv.gz");

@@ -116,10 +116,10 @@ TEST_F(ZipArchive, RefusesMoreThanTheLimitsSay) {
   EXPECT_THAT(refusal(many.bytes(), limits), HasSubstr("at most 4"));
   limits = {};
   limits.entry_bytes = 99;
-  EXPECT_THAT(refusal(many.bytes(), limits), HasSubstr("larger"));
+  EXPECT_THAT(refusal(many.bytes(), limits), HasSubstr("too large"));
   limits = {};
   limits.total_bytes = 499;
-  EXPECT_THAT(refusal(many.bytes(), limits), HasSubstr("larger"));
+  EXPECT_THAT(refusal(many.bytes(), limits), HasSubstr("too large"));
 }
 
 TEST_F(ZipArchive, StopsAtTheSizeAnEntrySays) {

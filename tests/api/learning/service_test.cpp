@@ -274,7 +274,7 @@ class SignedModels : public LearningService {
 TEST_F(SignedModels, AnEditedArtifactIsRefusedAtTheDoor) {
   const auto refused = upload(edited());
   EXPECT_EQ(refused.status, 422);
-  EXPECT_NE(refused.body.find("edited"), std::string::npos) << refused.body;
+  EXPECT_NE(refused.body.find("artifact was changed"), std::string::npos) << refused.body;
 }
 
 TEST_F(SignedModels, AManifestFromElsewhereIsNotBelievedButMeasuredHere) {
@@ -356,7 +356,7 @@ TEST_F(SignedModels, AnArtifactEditedInTheDatabaseIsNotUsedAndSaysSo) {
   open();
   const auto active = json(get("/api/v1/models/active"));
   EXPECT_EQ(active["raw"], true);
-  EXPECT_NE(active.value("note", "").find("edited"), std::string::npos) << active;
+  EXPECT_NE(active.value("note", "").find("artifact was changed"), std::string::npos) << active;
   EXPECT_NE(get("/api/v1/events").body.find("model.refused"), std::string::npos);
   EXPECT_EQ(json(get(path_))["standing"], "changed");
   EXPECT_EQ(get(path_ + "/artifact").status, 409);

@@ -523,7 +523,7 @@ TEST(FlightEngine, AnAnchorIsDoneAtItsOwnTargetWhereItHasOne) {
     EXPECT_EQ(task.reached, reached) << own_m.value_or(0) << ": " << task.why;
     EXPECT_EQ(task.done, reached) << task.why;
     const char* const wanted =
-        own_m ? "accuracy reached: 0.040 m, wanted 0.060 m" : "accuracy reached: 0.040 m, wanted 0.050 m";
+        own_m ? "accuracy reached: 0.040 m, target 0.060 m" : "accuracy reached: 0.040 m, target 0.050 m";
     EXPECT_EQ(task.why == wanted, reached) << task.why;
   }
 }

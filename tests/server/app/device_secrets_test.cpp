@@ -120,7 +120,7 @@ TEST(DeviceSecrets, APasswordGoesToTheCasterAndComesBackNowhere) {
   Caster stranger;
   const auto moved = server.call("PATCH", path, Json{{"address", stranger.address}}.dump(), change);
   EXPECT_EQ(moved.status, 422) << moved.body;
-  EXPECT_NE(moved.body.find("send it again"), std::string::npos) << moved.body;
+  EXPECT_NE(moved.body.find("send the password again"), std::string::npos) << moved.body;
   const auto renamed = server.call("PATCH", path, R"({"name":"base"})", change);
   EXPECT_EQ(renamed.status, 200) << renamed.body;
   EXPECT_NE(caster.request().find("bWU6c2VjcmV0"), std::string::npos) << "it is kept";

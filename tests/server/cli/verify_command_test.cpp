@@ -99,7 +99,7 @@ TEST_F(VerifyCommand, NamesAFileThatDiffers) {
   pack("pack.zip", "forged", "page", key_);
   const auto answer = verify(quoted("pack.zip"));
   EXPECT_EQ(answer.exit_code, 1);
-  EXPECT_THAT(answer.out, HasSubstr("report.html differs"));
+  EXPECT_THAT(answer.out, HasSubstr("report.html was changed"));
 }
 
 TEST_F(VerifyCommand, NamesAFileThatNobodyListed) {
