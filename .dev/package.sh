@@ -1,9 +1,15 @@
-# cmd_package: the Debian package. Its bytes depend on the commit and the compiler alone: dates are those of the commit.
+# cmd_package [--arm64]: the Debian package. Its bytes depend on the commit and the compiler alone: dates are those of the commit.
 cmd_package() {
+  [[ -z ${1:-} || $1 == --arm64 ]] || die "package knows --arm64 (for the companion computer of an aircraft); not '$1'"
   install_packages
-  ensure_node
-  build_preset release anchord
-  make_package "$PWD/$build_dir"
+  if [[ ${1:-} == --arm64 ]]; then
+    build_arm64
+    make_package "$PWD/build/arm64"
+  else
+    ensure_node
+    build_preset release anchord
+    make_package "$PWD/$build_dir"
+  fi
 }
 
 # make_package BUILD_FOLDER [cpack arguments...]: of what is built there.

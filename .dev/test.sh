@@ -1,6 +1,7 @@
-# cmd_test [--asan | --tsan] [ctest arguments...]: everything through CTest, one honest summary line at the end.
+# cmd_test [--arm64 | --asan | --tsan] [ctest arguments...]: everything through CTest, one honest summary line at the end.
 cmd_test() {
   case ${1:-} in
+    --arm64) arm64_tests ; return ;;
     --asan | --tsan) sanitized_tests "$@" ; return ;;
     --*san) die "test knows --asan (addresses, undefined behaviour) and --tsan (threads); not '$1'" ;;
   esac

@@ -3,7 +3,7 @@
 set(stage ${CPACK_TEMPORARY_INSTALL_DIRECTORY})
 set(usr ${stage}/usr)
 set(doc ${usr}/share/doc/anchord)
-set(program ${CPACK_ANCHORD_BINARY})
+set(program ${CPACK_ANCHORD_EMULATOR} ${CPACK_ANCHORD_BINARY})
 
 function(run)
   execute_process(COMMAND ${ARGV} RESULT_VARIABLE code ERROR_VARIABLE error)
@@ -39,7 +39,7 @@ file(WRITE ${doc}/changelog "anchord (${CPACK_PACKAGE_VERSION}) unstable; urgenc
  -- ${CPACK_PACKAGE_CONTACT}  ${date}
 ")
 file(COPY ${CPACK_ANCHORD_SOURCE_DIR}/CHANGELOG.md DESTINATION ${doc})
-run(${CPACK_ANCHORD_PYTHON} ${CPACK_ANCHORD_SOURCE_DIR}/server/packaging/sbom.py --binary ${program}
+run(${CPACK_ANCHORD_PYTHON} ${CPACK_ANCHORD_SOURCE_DIR}/server/packaging/sbom.py --binary ${CPACK_ANCHORD_BINARY}
   --source ${CPACK_ANCHORD_SOURCE_DIR} --version ${CPACK_PACKAGE_VERSION} --epoch ${epoch}
   --sbom ${doc}/anchord.spdx.json --licences ${doc}/licences.txt)
 run(gzip -9nf ${usr}/share/man/man1/anchord.1 ${doc}/changelog ${doc}/CHANGELOG.md ${doc}/licences.txt)

@@ -54,6 +54,8 @@ CTEST_SAYS=fail run test --tsan
 expect "a test that fails under a sanitizer" 1 'FAILED  One\.Two'
 run test --msan
 expect "a sanitizer that is not there" 1 "dev: test knows --asan .* and --tsan .*; not '--msan'"
+run package --armhf
+expect "a machine that packages are not made for" 1 "dev: package knows --arm64 .*; not '--armhf'"
 
 CTEST_SAYS=fail CTEST_SAYS_ALONE=run run test --tsan
 expect "what a sanitizer found once is found" 1 'FAILED  One\.Two'

@@ -7,7 +7,7 @@ source tests/dev/checks.sh
 listed() { awk -v group="$1" '{sub(/#.*/, "")} NF && $2 == group {print $1}' .ci/packages; }   # listed "" | @GROUP
 twice=$(awk '{sub(/#.*/, "")} NF {print $1, $2}' .ci/packages | sort | uniq -d)
 [[ -z $twice ]] ; pass_or_fail $? ".ci/packages lists a package twice" "$twice"
-unknown=$(awk '{sub(/#.*/, "")} NF > 1 {print $2}' .ci/packages | sort -u | grep -vxE '@(runtime|recommended|test|lint|coverage|fuzz|bench|fresh)')
+unknown=$(awk '{sub(/#.*/, "")} NF > 1 {print $2}' .ci/packages | sort -u | grep -vxE '@(runtime|recommended|test|lint|coverage|fuzz|bench|fresh|arm64)')
 [[ -z $unknown ]] ; pass_or_fail $? "groups that no command installs" "$unknown"
 
 # --- nothing that nobody uses: a library's header is included somewhere, a program is named somewhere.
@@ -15,7 +15,7 @@ unknown=$(awk '{sub(/#.*/, "")} NF > 1 {print $2}' .ci/packages | sort -u | grep
 data=" python3 ca-certificates proj-data libclang-rt-16-dev pkg-config "
 includes=$(grep -rhoE '^ *# *include *<[^>]+>' --include='*.cpp' --include='*.hpp' api core drivers server migrations tests | grep -oE '<[^>]+' | tr -d '<' | sort -u)
 own=(dev .dev .ci/run api core drivers server web tests migrations CMakeLists.txt CMakePresets.json docs)
-for package in $(listed "") $(listed @test) $(listed @bench) $(listed @lint) $(listed @coverage) $(listed @fuzz) $(listed @fresh); do
+for package in $(listed "") $(listed @test) $(listed @bench) $(listed @lint) $(listed @coverage) $(listed @fuzz) $(listed @fresh) $(listed @arm64); do
   [[ $data == *" $package "* ]] && continue
   files=$(dpkg -L "$package" 2>/dev/null) || continue   # of a group that is not installed here
   headers=$(grep -E '^/usr/include/.*[^/]$' <<<"$files")
