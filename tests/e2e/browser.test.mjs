@@ -85,7 +85,7 @@ test('signed out: the sheet asks for a token, refuses a wrong one, and the right
     await id('sign-in').waitFor();
     await id('token').fill('anc_000000_not-a-token');
     await id('sign-in-submit').click();
-    await page.getByText('not known').waitFor();
+    await page.getByText('is unknown').waitFor();
     assert.deepEqual(await violations(page), []);
     await picture(page, 'signed-out-light');
     await id('token').fill(server.token);

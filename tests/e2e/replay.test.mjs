@@ -97,8 +97,13 @@ test('nothing of the running flight is shown as a replay while the stored one is
     5000,
   );
   assert.equal(await page.getByTestId('range-list').count(), 0, 'no range of now');
-  for (const tile of ['rtk', 'uwb', 'drone'])
+  for (const tile of ['rtk', 'drone'])
     assert.doesNotMatch(await text(page.getByTestId(`status-${tile}`)), /FIX$|\d/, tile);
+  assert.match(
+    await text(page.getByTestId('status-uwb')),
+    /none|\b0\/\d+$/,
+    'no anchor is in range of what is not read yet',
+  );
   go_on();
   await page.getByTestId('range-list').waitFor({ timeout: 20_000 });
   await page.close();
