@@ -142,14 +142,14 @@ test('a recorded flight, played again, is the same rows: known to its own server
 
   const again = await run(['replay', file, '--url', server.url]);
   assert.equal(again.code, 0, again.stderr);
-  assert.match(again.stderr, new RegExp(`\\b0 rows accepted, ${live.length} known already, 0 rejected`));
+  assert.match(again.stderr, new RegExp(`\\b0 rows accepted, ${live.length} duplicates, 0 rejected`));
   same(await rows(server, mission), live);
 
   const other = await startServer();
   try {
     const { code, stderr } = await run(['replay', file, '--url', other.url, '--name', 'played', '--speed', '20']);
     assert.equal(code, 0, stderr);
-    assert.match(stderr, new RegExp(`${live.length} rows accepted, 0 known already, 0 rejected`));
+    assert.match(stderr, new RegExp(`${live.length} rows accepted, 0 duplicates, 0 rejected`));
     const [copy] = (await get('/api/v1/missions', other)).items;
     assert.deepEqual([copy.name, copy.state], ['played', 'finished']);
     same(await rows(other, copy.id), live);

@@ -102,7 +102,7 @@ test('a database that cannot be used ends the start with what to do, and the pas
     [postgres.url('anchord'), { env: { PGPASSFILE: '/nowhere', HOME: '/nowhere' } }, /password.*pgpass/],
     [postgres.url('absent'), {}, /"absent" does not exist/],
     [postgres.url('latin'), {}, /LATIN1.*createdb --encoding=UTF8/],
-    [postgres.url('newer'), {}, /another one|newer/],
+    [postgres.url('newer'), {}, /is not the one with which|newer/],
     [postgres.url('anchord', { user: `anchord:${encodeURIComponent(postgres.password)}` }), {}, /pgpass/],
     ['mysql://anchord@127.0.0.1/anchord', {}, /postgresql:\/\//],
   ]) {
