@@ -24,6 +24,14 @@ struct MadeFlight {
   std::uint64_t seed{1};
 };
 
+/// The same, with a heading that turns.
+inline MadeFlight turning(std::uint64_t seed) {
+  MadeFlight made;
+  made.turn_rate_radps = 0.2;
+  made.seed = seed;
+  return made;
+}
+
 /// Position on a Lissajous path at time t: in local metres, so truth is known in closed form.
 inline Eigen::Vector3d path(const MadeFlight& m, double t_s) {
   return {18 * std::sin(0.13 * t_s), m.width_m * std::cos(0.17 * t_s),

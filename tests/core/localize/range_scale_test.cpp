@@ -15,13 +15,7 @@ namespace {
 
 using testing::MadeFlight;
 using testing::make_flight;
-
-MadeFlight turning(std::uint64_t seed) {
-  MadeFlight made;
-  made.turn_rate_radps = 0.2;
-  made.seed = seed;
-  return made;
-}
+using testing::turning;
 
 const Gate& scale_gate(const AnchorSolution& anchor) {
   const auto& gates = anchor.estimate.gates;

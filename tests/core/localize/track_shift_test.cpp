@@ -15,13 +15,7 @@ namespace {
 
 using testing::MadeFlight;
 using testing::make_flight;
-
-MadeFlight turning(std::uint64_t seed) {
-  MadeFlight made;
-  made.turn_rate_radps = 0.2;
-  made.seed = seed;
-  return made;
-}
+using testing::turning;
 
 double time_s(const Fix& fix) { return seconds_between(UtcTime::from_seconds(0), fix.time); }
 
