@@ -52,5 +52,5 @@ arm64_tests() {
   build_preset release anchord
   build_arm64
   say "testing build/arm64/anchord under qemu"
-  ANCHORD_BINARY=$PWD/$build_dir/anchord ANCHORD_ARM64=$PWD/build/arm64/anchord ANCHORD_ARM64_ROOT=$PWD/$arm64_root tests/dev/arm64.test.sh
+  ANCHORD_BINARY=$PWD/$build_dir/anchord ARM64_BINARY=$PWD/build/arm64/anchord ARM64_ROOT=$PWD/$arm64_root tests/dev/arm64.test.sh
 }

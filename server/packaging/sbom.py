@@ -23,11 +23,21 @@ def output(*command):
 
 def needed_libraries(binary):
     names = re.findall(r"\(NEEDED\).*\[(.+)\]", output("readelf", "-d", binary))
+    if "AArch64" in output("readelf", "-h", binary):
+        return {name: of_this_machine(name) for name in names}
     places = dict(re.findall(r"^\s*(\S+) => (\S+)", output("ldd", binary), re.M))
     # The loader names itself by its path.
     for path in re.findall(r"^\s*(/\S+) \(0x", output("ldd", binary), re.M):
         places[pathlib.Path(path).name] = path
     return {name: places[name] for name in names}
+
+
+def of_this_machine(name):
+    """For another architecture: this machine's library of that name, which the same release of Debian has in the same package."""
+    if name.startswith("ld-linux"):
+        name = "libc.so.6"
+    found = re.search(rf"^\s*{re.escape(name)} \(.*\) => (\S+)", output("/sbin/ldconfig", "-p"), re.M)
+    return found.group(1) if found else sys.exit(f"sbom: this machine has no {name}")
 
 
 def owner(path):

@@ -5,18 +5,18 @@ set -uo pipefail
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/../.." && pwd)
 cd "$root" || exit 1
 source tests/dev/checks.sh
-for name in ANCHORD_BINARY ANCHORD_ARM64 ANCHORD_ARM64_ROOT; do
+for name in ANCHORD_BINARY ARM64_BINARY ARM64_ROOT; do
   [[ -e ${!name:-} ]] || { echo "FAILED: $name names nothing: run ./dev test --arm64"; exit 1; }
 done
 scratch=$(mktemp -d)
 server=
 finish() { [[ -z $server ]] || kill "$server" 2>/dev/null; rm -rf "$scratch"; }
 trap finish EXIT
-export PROJ_DATA=$ANCHORD_ARM64_ROOT/usr/share/proj SOURCE_DATE_EPOCH=1790000000
-arm64() { qemu-aarch64-static -L "$ANCHORD_ARM64_ROOT" "$ANCHORD_ARM64" "$@"; }
+export PROJ_DATA=$ARM64_ROOT/usr/share/proj SOURCE_DATE_EPOCH=1790000000
+arm64() { qemu-aarch64-static -L "$ARM64_ROOT" "$ARM64_BINARY" "$@"; }
 native() { "$ANCHORD_BINARY" "$@"; }
 
-attempt readelf -h "$ANCHORD_ARM64"
+attempt readelf -h "$ARM64_BINARY"
 expect "the executable" 0 'Machine: +AArch64'
 attempt arm64 --version
 expect "the program under qemu" 0 "^$(native --version | cut -d' ' -f1-2)"
@@ -35,20 +35,20 @@ attempt jq -nr --argjson a "$(anchors arm64)" --argjson b "$(anchors native)" '
 expect "anchors of both, within 0.01 mm" 0 '^6 anchors agree'
 
 # The server: a mission and its rows in, the same rows out, a clean end.
-arm64 serve --listen 127.0.0.1:0 --auth=off --data-dir "$scratch/data" >"$scratch/serve.log" 2>&1 &
+qemu-aarch64-static -L "$ARM64_ROOT" "$ARM64_BINARY" serve --listen 127.0.0.1:0 --auth=off --data-dir "$scratch/data" >"$scratch/serve.log" 2>&1 &
 server=$!
 deadline=$((SECONDS + 120)) url=
 until [[ -n $url ]] || ((SECONDS > deadline)) || ! kill -0 "$server" 2>/dev/null; do
   url=$(grep -o -m1 'http://127\.0\.0\.1:[0-9]*' "$scratch/serve.log") || sleep 0.2
 done
-attempt curl -fsS "$url/api/v1/version"
+attempt curl -fsS "$url/version"
 expect "the server" 0 '"version"'
 attempt curl -fsS "$url/"
 expect "the dashboard" 0 '<title>'
 attempt native import flight "$scratch/flight" --url "$url"
 expect "a flight brought to it" 0 '5760 rows accepted'
 mission=$(curl -fsS "$url/api/v1/missions" | jq -r '.items[0].id')
-attempt curl -fsS "$url/api/v1/missions/$mission/ranges?limit=1"
+attempt curl -fsS "$url/api/v1/ranges?mission=$mission&limit=1"
 expect "its ranges" 0 '"distance_m"'
 attempt curl -fsS "$url/api/v1/transform" -H 'content-type: application/json' -d '{"from": "crs", "crs": "UTM 31N", "to": "geo", "points": [[549900, 5652600, 60]]}'
 expect "map coordinates by PROJ" 0 '\[3\.711486567[0-9]*,51\.022789202'
@@ -56,7 +56,7 @@ kill "$server" && wait "$server"
 pass_or_fail $? "the server's end" "$(tail -n 3 "$scratch/serve.log")"
 server=
 
-(cd "$(dirname "$ANCHORD_ARM64")" && umask 022 && cpack -G DEB -B "$scratch/package") >"$scratch/package.log" 2>&1
+(cd "$(dirname "$ARM64_BINARY")" && umask 022 && cpack -G DEB -B "$scratch/package") >"$scratch/package.log" 2>&1
 pass_or_fail $? "cpack" "$(tail -n 5 "$scratch/package.log")"
 attempt dpkg-deb --field "$scratch"/package/anchord_*_arm64.deb Architecture Depends
 expect "the package" 0 'Architecture: arm64.*libc6'
