@@ -71,10 +71,11 @@ describe('the gates of a running estimate', () => {
     });
   });
   it('name what the ranges contradict, also of an anchor that is done', () => {
-    const reason = 'its height was taken for 8.00 m above the origin, its ranges say 5.10 m (5.8 sigma)';
+    const reason =
+      'the height 8.00 m above the origin (of a height search, or given) disagrees with the ranges, 5.10 m (5.8 sigma)';
     expect(why_not_done({ ...running, gates: [], reason })!.text).toContain('8.00 m above the origin');
     expect(why_not_done({ ...running, gates: [], status: 'converged', reason })!.text).toContain(
-      'its ranges say 5.10 m',
+      'disagrees with the ranges, 5.10 m',
     );
     expect(why_not_done({ ...running, gates: [], status: 'converged' })).toBeNull();
   });

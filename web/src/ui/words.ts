@@ -27,7 +27,7 @@ const DONE: ReadonlySet<AnchorStatus> = new Set(['converged', 'accepted', 'passe
 export function why_not_done(e: EstimateMsg, task = ''): { title: string; text: string } | null {
   // What the turn or the height search found and the ranges contradict is to be looked at, however good the position.
   if (e.verdict === 'ok' && DONE.has(e.status))
-    return e.reason.includes('its ranges say')
+    return e.reason.includes('disagrees with the ranges') // as core/localize/prior_conflict says it
       ? { title: 'Done, but a turn or height search disagrees', text: sentence(e.reason) }
       : null;
   if (e.status === 'gave_up')
