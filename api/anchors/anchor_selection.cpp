@@ -10,6 +10,7 @@
 #include "api/kit/support.hpp"
 #include "api/missions/mission_service.hpp"
 #include "api/wire/live_writer.hpp"
+#include "core/types/lon_lat_box.hpp"
 
 namespace anchord::api {
 
@@ -42,16 +43,7 @@ std::vector<AnchorFeature> live(AnchorApi& s, const std::optional<MissionId>& mi
   return out;
 }
 
-/// West of an area over the date line is east of its east (RFC 7946, 5.2).
-struct Box {
-  double west, south, east, north;
-  bool holds(const Wgs84& at) const {
-    const bool along =
-        west > east ? at.lon_deg >= west || at.lon_deg <= east : at.lon_deg >= west && at.lon_deg <= east;
-    return along && at.lat_deg >= south && at.lat_deg <= north;
-  }
-};
-std::optional<Box> query_box(const Request& request) {
+std::optional<LonLatBox> query_box(const Request& request) {
   const auto text = request.query_value("bbox");
   if (!text) return std::nullopt;
   nlohmann::json numbers;
@@ -60,9 +52,9 @@ std::optional<Box> query_box(const Request& request) {
     throw_problem(422, "validation", "bbox must be west,south,east,north in degrees",
                   {{"/bbox", "bad_value", "must be four numbers"}});
   }
-  const Box box{numbers[0], numbers[1], numbers[2], numbers[3]};
+  const LonLatBox box{numbers[0], numbers[1], numbers[2], numbers[3]};
   if (box.south > box.north)
-    throw_problem(422, "validation", "bbox is west,south,east,north in degrees",
+    throw_problem(422, "validation", "bbox must be west,south,east,north in degrees",
                   {{"/bbox", "bad_value", "has its south above its north"}});
   return box;
 }

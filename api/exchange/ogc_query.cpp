@@ -64,7 +64,7 @@ OgcBox box_of(const Request& request, const std::string& text) {
     std::swap(n[3], n[4]);
   }
   if (n[1] > n[4] || n[2] > n[5]) bad("bbox", "has its lower corner above its upper one");
-  return {n[0], n[1], n[3], n[4], n[2], n[5]};
+  return {{n[0], n[1], n[3], n[4]}, n[2], n[5]};
 }
 
 std::optional<UtcTime> instant(std::string_view text) {
@@ -88,19 +88,6 @@ OgcInterval interval_of(const std::string& text) {
 }
 
 }  // namespace
-
-bool OgcBox::holds(const Wgs84& at) const {
-  const bool across = west > east;
-  const bool along =
-      across ? at.lon_deg >= west || at.lon_deg <= east : at.lon_deg >= west && at.lon_deg <= east;
-  return along && at.lat_deg >= south && at.lat_deg <= north && at.height_m >= low_m && at.height_m <= high_m;
-}
-
-bool OgcBox::meets(double west_of, double south_of, double east_of, double north_of) const {
-  const bool across = west > east;
-  const bool along = across ? east_of >= west || west_of <= east : east_of >= west && west_of <= east;
-  return along && north_of >= south && south_of <= north;
-}
 
 OgcQuery ogc_items_query(const Request& request, std::size_t usual, std::size_t maximum, bool heights) {
   only(request, {"limit", "cursor", "bbox", "bbox-crs", "datetime", "crs", "f"});

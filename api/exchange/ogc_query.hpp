@@ -8,7 +8,7 @@
 
 #include "api/kit/message.hpp"
 #include "core/base/time.hpp"
-#include "core/types/position.hpp"
+#include "core/types/lon_lat_box.hpp"
 
 namespace anchord::api {
 
@@ -29,13 +29,12 @@ inline constexpr std::array k_ogc_crs{k_storage_crs,
 /// Of features without heights.
 inline constexpr OgcCrs k_flat_crs = k_ogc_crs[1];
 
-/// A bounding box in degrees and metres; west > east crosses the antimeridian.
-struct OgcBox {
-  double west, south, east, north;
+/// A bounding box with heights, metres.
+struct OgcBox : LonLatBox {
   double low_m, high_m;
-  bool holds(const Wgs84& at) const;
-  /// Whether it has a part of a rectangle that does not cross the antimeridian, at any height.
-  bool meets(double west_of, double south_of, double east_of, double north_of) const;
+  bool holds(const Wgs84& at) const {
+    return LonLatBox::holds(at) && at.height_m >= low_m && at.height_m <= high_m;
+  }
 };
 
 /// Instants from..to, both included; an open end is absent.

@@ -39,11 +39,11 @@ struct Item {
   Ordered feature;
   std::optional<Wgs84> at;
   std::optional<UtcTime> time;
-  std::optional<ZoneBounds> bounds{};  ///< of what is no point
+  std::optional<LonLatBox> bounds{};  ///< of what is no point
 };
 
 bool is_in(const OgcBox& box, const Item& item) {
-  if (const auto& b = item.bounds) return box.meets(b->west, b->south, b->east, b->north);
+  if (item.bounds) return box.meets(*item.bounds);
   return item.at && box.holds(*item.at);
 }
 
@@ -279,16 +279,18 @@ void widen(std::optional<OgcBox>& box, const Item& item) {
   constexpr double k_any = std::numeric_limits<double>::infinity();
   OgcBox one{};
   if (item.bounds)
-    one = {item.bounds->west, item.bounds->south, item.bounds->east, item.bounds->north, -k_any, k_any};
+    one = {*item.bounds, -k_any, k_any};
   else if (item.at)
-    one = {item.at->lon_deg, item.at->lat_deg,  item.at->lon_deg,
-           item.at->lat_deg, item.at->height_m, item.at->height_m};
+    one = {{item.at->lon_deg, item.at->lat_deg, item.at->lon_deg, item.at->lat_deg},
+           item.at->height_m,
+           item.at->height_m};
   else
     return;
   if (!box) box = one;
-  box = OgcBox{std::min(box->west, one.west),   std::min(box->south, one.south),
-               std::max(box->east, one.east),   std::max(box->north, one.north),
-               std::min(box->low_m, one.low_m), std::max(box->high_m, one.high_m)};
+  box = OgcBox{{std::min(box->west, one.west), std::min(box->south, one.south), std::max(box->east, one.east),
+                std::max(box->north, one.north)},
+               std::min(box->low_m, one.low_m),
+               std::max(box->high_m, one.high_m)};
 }
 
 /// Of anchors and floors, where they are few enough to look at; a reader zooms to it.

@@ -53,10 +53,10 @@ Result<void> each_zone(PlaceStore& places, const std::function<void(const Floor&
   }
 }
 
-std::optional<ZoneBounds> bounds_of(const Ordered& zone) {
+std::optional<LonLatBox> bounds_of(const Ordered& zone) {
   const auto& geometry = zone.at("geometry");
   if (!geometry.is_object()) return std::nullopt;
-  ZoneBounds out;
+  LonLatBox out{180, 90, -180, -90};
   for (const auto& corner : geometry.at("coordinates").at(0)) {
     const double lon = corner.at(0), lat = corner.at(1);
     out = {std::min(out.west, lon), std::min(out.south, lat), std::max(out.east, lon),

@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "core/base/result.hpp"
+#include "core/types/lon_lat_box.hpp"
 #include "core/types/place.hpp"
 
 namespace anchord {
@@ -20,10 +21,7 @@ nlohmann::ordered_json zone_json(const Floor& floor, const Building& building);
 /// Each floor of every building. errors: those of the store
 Result<void> each_zone(PlaceStore& places, const std::function<void(const Floor&, const Building&)>& take);
 
-/// Around an outline, in degrees: west, south, east, north; nothing without one.
-struct ZoneBounds {
-  double west{180}, south{90}, east{-180}, north{-90};
-};
-std::optional<ZoneBounds> bounds_of(const nlohmann::ordered_json& zone);
+/// Around an outline; nothing without one.
+std::optional<LonLatBox> bounds_of(const nlohmann::ordered_json& zone);
 
 }  // namespace anchord::api
