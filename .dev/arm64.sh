@@ -33,12 +33,6 @@ make_arm64_root() {
   printf '%s\n' "$stamp" >"$arm64_root/.made"
 }
 
-# Lines of a sources.list: where this machine gets Debian 12 from.
-debian_sources() {
-  apt-get indextargets --format 'deb $(REPO_URI) $(RELEASE) $(COMPONENT)' 'Created-By: Packages' |
-    awk '$3 ~ /^bookworm(-updates|-security)?$/ && $4 == "main"' | sort -u
-}
-
 # build_arm64: build/arm64/anchord.
 build_arm64() {
   install_packages arm64

@@ -20,9 +20,8 @@ PATH=$PATH:/usr/sbin:/sbin
 command -v debootstrap >/dev/null || cannot "no debootstrap (apt-get install debootstrap)"
 command -v chroot >/dev/null || cannot "no chroot"
 
-# This machine's own sources of Debian 12, as lines of a sources.list.
-sources=$(apt-get indextargets --format 'deb $(REPO_URI) $(RELEASE) $(COMPONENT)' 'Created-By: Packages' 2>/dev/null |
-  awk '$3 ~ /^bookworm(-updates|-security)?$/ && $4 == "main"')
+source "$root/.dev/sources.sh"
+sources=$(debian_sources)
 mirror=$(awk '$3 == "bookworm" {print $2; exit}' <<<"$sources")
 [[ -n $mirror ]] || cannot "apt here has no lists of Debian 12 bookworm (apt-get update)"
 
