@@ -110,6 +110,8 @@ constexpr std::array k_gate_words{
     GateWords{"clock", "Clock of the ranges against the clock of the track", "s"},
     GateWords{"unseen_arm", "Undetected error that a wrong lever arm would cause", "m"},
     GateWords{"range_scale", "Scale error of the ranges", "%"},
+    GateWords{"range_step", "Step of the ranges between low and high", "m"},
+    GateWords{"range_drift", "Drift of the ranges over the flight", "m"},
     GateWords{"track_shift", "No shift of the track at its gaps", "χ²"},
     GateWords{"track", "Positions shifted together against the others", "%"},
     GateWords{"profile", "The kit agrees with its other flights", "χ²"},

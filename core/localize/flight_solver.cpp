@@ -11,10 +11,10 @@
 #include "core/localize/flight_verdict.hpp"
 #include "core/localize/joint_model.hpp"
 #include "core/localize/kit_prior.hpp"
-#include "core/localize/range_scale.hpp"
 #include "core/localize/region_reason.hpp"
 #include "core/localize/scatter_doubt.hpp"
 #include "core/localize/sector_doubt.hpp"
+#include "core/localize/systematic_error.hpp"
 #include "core/localize/track_shift.hpp"
 #include "core/localize/unplaced.hpp"
 #include "core/localize/unseen_arm.hpp"
@@ -37,7 +37,7 @@ struct Work {
   BiasGate gate{};
   std::vector<Gate> checks{};               ///< of the whole flight: every anchor must pass them
   std::vector<Gate> unseen_arm{};           ///< one for each anchor, where it is asked
-  std::optional<RangeScale> scale{};        ///< of the ranges
+  std::optional<SystematicErrors> errors{};  ///< of the ranges
   std::vector<Eigen::Matrix3d> shift_m2{};  ///< of each region, by shifts of the track that may be
   bool antennas_apart{true};                ///< their vertical arms differ by what this flight can show
 
@@ -214,9 +214,9 @@ SharedSolution shared_of(const Work& work) {
     shared.lever_left_m = valued(k_shared_left);
   }
   shared.lever_arm_sigma_m = work.options.lever_arm_sigma_m;
-  if (work.scale) {
-    shared.range_scale = {work.scale->all.value, work.scale->all.sigma};
-    shared.range_scale_z = work.scale->all.z;
+  if (work.errors) {
+    shared.range_scale = {work.errors->scale.value, work.errors->scale.sigma};
+    shared.range_scale_z = work.errors->scale.z;
   }
   shared.bias_z = work.gate.z;
   shared.bias_determined = work.options.fixed_bias_m || work.gate.known;
@@ -236,12 +236,13 @@ void ask_shift(const FlightData& flight, Work& work) {
     work.fit.anchor_covariance[i].topLeftCorner<3, 3>() += work.shift_m2[i];
 }
 
-/// Asks whether the ranges are right but for a factor; the regions hold what they cannot exclude.
-Result<void> ask_scale(Work& work) {
-  BOOST_OUTCOME_TRY(work.scale, check_range_scale(work.rows, work.fit, work.prior, work.options));
-  if (work.scale->note) work.rows.notes.push_back(*work.scale->note);
-  for (std::size_t i = 0; i < work.scale->covariance_m2.size(); ++i)
-    work.fit.anchor_covariance[i].topLeftCorner<3, 3>() += work.scale->covariance_m2[i];
+/// Asks the ranges for systematic errors; the regions hold what they cannot exclude.
+Result<void> ask_errors(Work& work) {
+  BOOST_OUTCOME_TRY(work.errors, check_systematic_errors(work.rows, work.fit, work.prior, work.options));
+  auto& notes = work.rows.notes;
+  notes.insert(notes.end(), work.errors->notes.begin(), work.errors->notes.end());
+  for (std::size_t i = 0; i < work.errors->covariance_m2.size(); ++i)
+    work.fit.anchor_covariance[i].topLeftCorner<3, 3>() += work.errors->covariance_m2[i];
   return boost::outcome_v2::success();
 }
 
@@ -290,7 +291,7 @@ FlightSolution describe(Work& work, const FlightData& flight) {
       auto& gates = anchor.estimate.gates;
       gates.insert(gates.end(), work.checks.begin(), work.checks.end());
       if (!work.unseen_arm.empty()) gates.push_back(work.unseen_arm[i]);
-      if (work.scale) gates.push_back(work.scale->gates[i]);
+      if (work.errors) gates.insert(gates.end(), work.errors->gates[i].begin(), work.errors->gates[i].end());
       anchor.budget = std::move(budgets[i]);
       if (!work.shift_m2.empty()) move_shift_part(work.shift_m2[i], *anchor.budget);
       name_largest_part(anchor.estimate, *anchor.budget);
@@ -320,7 +321,7 @@ Result<void> check_flight(const FlightData& flight, std::vector<Work>& all, std:
   if (const auto clock = check_clock(work.rows, work.fit)) work.checks.push_back(*clock);
   add_arm_doubt(work.rows, work.prior, work.options, work.fit);
   work.unseen_arm = unseen_arm_gates(work.rows, work.fit, work.prior, work.options);
-  BOOST_OUTCOME_TRY(ask_scale(work));
+  BOOST_OUTCOME_TRY(ask_errors(work));
   ask_shift(flight, work);
   if (work.rows.step_share > 0) work.checks.push_back(check_steps(work.rows.step_share, options));
   const auto others = others_of(all, i, options);

@@ -66,6 +66,16 @@ const WORDS: Record<string, Words> = {
     fails: 'The ranges are too long or too short by a factor: wrong unit, clock or setting of the radios',
     unit: '%',
   },
+  range_step: {
+    passes: 'Ranges measured low and high agree',
+    fails: 'Ranges measured high are too long or too short against those measured low',
+    unit: 'm',
+  },
+  range_drift: {
+    passes: 'No drift of the ranges over the flight',
+    fails: 'The ranges drift over the flight: a radio that was not warm, or a clock',
+    unit: 'm',
+  },
   track_shift: {
     passes: 'No shift of the track at its gaps',
     fails: 'A part of the track is shifted against the rest: wrong fix, or the base position changed',

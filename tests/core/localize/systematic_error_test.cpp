@@ -1,6 +1,6 @@
-// Ranges that are right but for a factor. Truth and ranges are made from a path in closed form: the factor
-// put in is the factor to be found.
-#include "core/localize/range_scale.hpp"
+// Ranges that are right but for a factor, a step or a drift. Truth and ranges are made from a path in closed
+// form: the error put in is the error to be found.
+#include "core/localize/systematic_error.hpp"
 
 #include <gtest/gtest.h>
 
@@ -17,19 +17,35 @@ using testing::MadeFlight;
 using testing::make_flight;
 using testing::turning;
 
-const Gate& scale_gate(const AnchorSolution& anchor) {
+const Gate& gate_named(const AnchorSolution& anchor, const char* name) {
   const auto& gates = anchor.estimate.gates;
-  const auto at = std::ranges::find(gates, "range_scale", &Gate::name);
+  const auto at = std::ranges::find(gates, name, &Gate::name);
   EXPECT_NE(at, gates.end());
   static const Gate none;
   return at == gates.end() ? none : *at;
+}
+
+const Gate& scale_gate(const AnchorSolution& anchor) { return gate_named(anchor, "range_scale"); }
+
+/// Antennas of this flight above this height.
+double middle_up_m(const FlightData& flight) {
+  std::vector<double> ups_m;
+  for (const Fix& fix : flight.fixes) ups_m.push_back(fix.local_m.z());
+  std::ranges::nth_element(ups_m, ups_m.begin() + static_cast<std::ptrdiff_t>(ups_m.size() / 2));
+  return ups_m[ups_m.size() / 2];
+}
+
+/// Height of the first track point at or after a time.
+double up_at(const FlightData& flight, double t_s) {
+  const auto at = std::ranges::lower_bound(flight.fixes, UtcTime::from_seconds(t_s), {}, &Fix::time);
+  return at == flight.fixes.end() ? flight.fixes.back().local_m.z() : at->local_m.z();
 }
 
 void expect_says(const Gate& gate, const char* words) {
   EXPECT_NE(gate.why.find(words), std::string::npos) << gate.why;
 }
 
-TEST(RangeScale, WithholdsEveryAnchorWhereAllRangesHaveAFactor) {
+TEST(SystematicErrors, WithholdsEveryAnchorWhereAllRangesHaveAFactor) {
   for (const double factor : {0.9, 0.97, 1.02, 1.05, 1.1}) {
     for (const std::uint64_t seed : {1, 2}) {
       FlightData flight = make_flight(turning(seed));
@@ -49,7 +65,7 @@ TEST(RangeScale, WithholdsEveryAnchorWhereAllRangesHaveAFactor) {
   }
 }
 
-TEST(RangeScale, NamesTheAntennaWhoseRangesHaveAFactor) {
+TEST(SystematicErrors, NamesTheAntennaWhoseRangesHaveAFactor) {
   FlightData flight = make_flight(turning(3));
   flight.mission.tags.push_back({NetworkId{0x6e02}, 0, {0, 0, 0}});
   for (std::size_t i = 0; i < flight.ranges.size(); i += 2) {
@@ -64,7 +80,7 @@ TEST(RangeScale, NamesTheAntennaWhoseRangesHaveAFactor) {
   }
 }
 
-TEST(RangeScale, WithholdsTheOneAnchorWhoseRangesHaveAFactor) {
+TEST(SystematicErrors, WithholdsTheOneAnchorWhoseRangesHaveAFactor) {
   FlightData flight = make_flight(turning(4));
   for (Range& range : flight.ranges)
     if (range.anchor == NetworkId{0x6001}) range.distance_m *= 1.03;
@@ -76,7 +92,7 @@ TEST(RangeScale, WithholdsTheOneAnchorWhoseRangesHaveAFactor) {
   }
 }
 
-TEST(RangeScale, LeavesGoodFlightsAccepted) {
+TEST(SystematicErrors, LeavesGoodFlightsAccepted) {
   for (const std::uint64_t seed : {11, 12, 13, 14, 15, 16}) {
     MadeFlight made = turning(seed);
     // None of them is a factor.
@@ -91,8 +107,55 @@ TEST(RangeScale, LeavesGoodFlightsAccepted) {
   }
 }
 
+TEST(SystematicErrors, WithholdEveryAnchorWhereRangesMeasuredHighAreLate) {
+  for (const std::uint64_t seed : {1, 2, 3}) {
+    FlightData flight = make_flight(turning(seed));
+    const double middle_m = middle_up_m(flight);
+    for (Range& range : flight.ranges)
+      if (up_at(flight, range.time.seconds()) > middle_m) range.distance_m += 0.3;
+    const FlightSolution solution = solve_flight(flight).value();
+    for (const AnchorSolution& anchor : solution.anchors) {
+      const Gate& gate = gate_named(anchor, "range_step");
+      EXPECT_FALSE(gate.passed) << gate.why;
+      expect_says(gate, "too long against those below");
+      EXPECT_FALSE(anchor.estimate.acceptable());
+    }
+  }
+}
+
+TEST(SystematicErrors, WithholdEveryAnchorWhereRangesDrift) {
+  for (const double drift_m : {0.4, -0.4}) {
+    FlightData flight = make_flight(turning(5));
+    const double from_s = flight.ranges.front().time.seconds(),
+                 length_s = flight.ranges.back().time.seconds() - from_s;
+    for (Range& range : flight.ranges)
+      range.distance_m += drift_m * (range.time.seconds() - from_s) / length_s;
+    const FlightSolution solution = solve_flight(flight).value();
+    for (const AnchorSolution& anchor : solution.anchors) {
+      const Gate& gate = gate_named(anchor, "range_drift");
+      EXPECT_FALSE(gate.passed) << gate.why;
+      EXPECT_NEAR(gate.value.value_or(0), 0.4, 0.1);
+      expect_says(gate, drift_m > 0 ? "the ranges grow by" : "the ranges shrink by");
+      EXPECT_FALSE(anchor.estimate.acceptable());
+    }
+  }
+}
+
+TEST(SystematicErrors, LeaveGoodFlightsWithoutStepOrDrift) {
+  for (const std::uint64_t seed : {11, 12, 13, 14, 15, 16}) {
+    const FlightSolution solution = solve_flight(make_flight(turning(seed))).value();
+    for (const AnchorSolution& anchor : solution.anchors) {
+      for (const char* name : {"range_step", "range_drift"}) {
+        const Gate& gate = gate_named(anchor, name);
+        EXPECT_TRUE(gate.passed) << gate.why;
+        EXPECT_LT(gate.value.value_or(1), 0.05) << name;
+      }
+    }
+  }
+}
+
 // In a small hall ranges of real radios have a slope of their own: no factor is shown there.
-TEST(RangeScale, TakesNoSlopeOfNearRangesForAFactor) {
+TEST(SystematicErrors, TakesNoSlopeOfNearRangesForAFactor) {
   MadeFlight made = turning(21);
   made.anchors = {{8, 2, 1.5}, {-7, 4, 6}, {3, -9, 2}, {-6, -5, 9}};
   FlightData flight = make_flight(made);
