@@ -35,11 +35,11 @@ struct Work {
   ProfileFactor alone{};  ///< what the flight said before it was told anything
   std::string kit{}, name{}, digest{};
   BiasGate gate{};
-  std::vector<Gate> checks{};               ///< of the whole flight: every anchor must pass them
-  std::vector<Gate> unseen_arm{};           ///< one for each anchor, where it is asked
+  std::vector<Gate> checks{};                ///< of the whole flight: every anchor must pass them
+  std::vector<Gate> unseen_arm{};            ///< one for each anchor, where it is asked
   std::optional<SystematicErrors> errors{};  ///< of the ranges
-  std::vector<Eigen::Matrix3d> shift_m2{};  ///< of each region, by shifts of the track that may be
-  bool antennas_apart{true};                ///< their vertical arms differ by what this flight can show
+  std::vector<Eigen::Matrix3d> shift_m2{};   ///< of each region, by shifts of the track that may be
+  bool antennas_apart{true};                 ///< their vertical arms differ by what this flight can show
 
   Eigen::Index antennas() const {
     return static_cast<Eigen::Index>(std::min<std::size_t>(rows.antennas.size(), k_most_antennas));
@@ -239,8 +239,7 @@ void ask_shift(const FlightData& flight, Work& work) {
 /// Asks the ranges for systematic errors; the regions hold what they cannot exclude.
 Result<void> ask_errors(Work& work) {
   BOOST_OUTCOME_TRY(work.errors, check_systematic_errors(work.rows, work.fit, work.prior, work.options));
-  auto& notes = work.rows.notes;
-  notes.insert(notes.end(), work.errors->notes.begin(), work.errors->notes.end());
+  if (work.errors->note) work.rows.notes.push_back(*work.errors->note);
   for (std::size_t i = 0; i < work.errors->covariance_m2.size(); ++i)
     work.fit.anchor_covariance[i].topLeftCorner<3, 3>() += work.errors->covariance_m2[i];
   return boost::outcome_v2::success();

@@ -36,7 +36,7 @@ struct SharedSolution {
   std::vector<AntennaArm> lever_up_by_antenna;  ///< each that was heard; lever_up_m is what they share
   std::optional<Valued> lever_forward_m, lever_left_m;  ///< on top of the declared arm, where asked for
   std::optional<double> lever_arm_sigma_m{};  ///< of the declared arm, as the regions hold it; absent: none
-  /// The ranges are too long by this share of their length (systematic_error.hpp); nothing is corrected by it.
+  /// The ranges are too long by this share of their length (systematic_error.hpp); nothing is corrected.
   Valued range_scale;
   double range_scale_z{};
   bool bias_determined{true};  ///< false: neither this flight nor a profile says what the bias is

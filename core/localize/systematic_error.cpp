@@ -187,22 +187,7 @@ ErrorTest::Anchor ErrorTest::anchor_of(std::size_t index, Weighing weighing) con
   }
   Eigen::Matrix4d own = Eigen::Matrix4d::Zero();
   for (const Sums& sums : out.by_antenna) own += sums.topLeftCorner<k_own, k_own>();
-  const double delay_information = 1.0 / (options.delay_prior_m * options.delay_prior_m);
-  own(3, 3) += delay_information;
-  out.prior_gradient[3] -= delay_information * anchor.delay_m;
-  const PriorNormal place = prior_normal(priors_of(flight.anchors[index].id, options), options.outline_m,
-                                         options.outline_sigma_m, anchor.position_m);
-  own.topLeftCorner<3, 3>() += place.information;
-  out.prior_gradient.head<3>() += place.gradient;
-  if (options.dims == Dims::two) {
-    own.row(2).setZero();
-    own.col(2).setZero();
-    own(2, 2) = 1.0;
-  }
-  // A direction no range sees, as in build_normal.
-  own.topLeftCorner<3, 3>().diagonal().array() +=
-      1e-6 * own.topLeftCorner<3, 3>().diagonal().maxCoeff() + 1e-12;
-  out.own_inverse = own.ldlt().solve(Eigen::Matrix4d::Identity());
+  out.own_inverse = add_anchor_priors(flight.anchors[index].id, anchor, options, own, out.prior_gradient);
   return out;
 }
 
@@ -401,7 +386,7 @@ std::string why_step(const Middle& middle, const Answer& answer) {
         text, sizeof text,
         "ranges measured above %.1f m (over the origin) are %.2f m too %s against those below, with "
         "sigma %.2f m (%.1f sigma): a reflection or the antenna; fly with the tag mounted "
-        "otherwise, or leave one of the two out",
+        "otherwise, or exclude the ranges of one half",
         middle.up_m, std::abs(found.value), found.value > 0 ? "long" : "short", found.sigma,
         std::abs(found.z));
   return text;
@@ -495,7 +480,7 @@ Result<SystematicErrors> check_systematic_errors(const FlightRows& flight, const
         "which this flight determines only so well: scale %.1f %%, step between low and high %.2f m, "
         "drift over the flight %.2f m (one sigma)",
         n_wider, flight.anchors.size(), 100 * out.scale.sigma, out.step.sigma, out.drift.sigma);
-    out.notes.emplace_back(text);
+    out.note = text;
   }
   return out;
 }

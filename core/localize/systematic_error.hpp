@@ -25,7 +25,7 @@ struct SystematicErrors {
   ErrorFinding drift;  ///< what ranges grow by from the beginning of the flight to its end; metres
   std::vector<std::vector<Gate>> gates;  ///< of each anchor: "range_scale", "range_step", "range_drift"
   std::vector<Eigen::Matrix3d> covariance_m2{};  ///< what the region of each anchor is to hold for it beside
-  std::vector<std::string> notes{};              ///< where that makes anchors less certain
+  std::optional<std::string> note{};             ///< where that makes anchors less certain
 };
 
 /// Errors that all residuals of a fit may hide, since place, bias and unit delay take most of them in. Asked

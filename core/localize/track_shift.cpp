@@ -238,27 +238,11 @@ AnchorParts ShiftTest::parts_of(std::size_t index) const {
     out.parts[line.part].noalias() += by.per_m2 * columns * columns.transpose();
   }
   for (const Sums& part : out.parts) out.all += part;
-  Eigen::Matrix4d own = out.all.topLeftCorner<k_own, k_own>();
   out.shared = out.all.block<k_own, k_shared_size>(0, k_own);
+  if (options.dims == Dims::two) out.shared.row(2).setZero();
   out.gradient = out.all.topRightCorner<k_own, 1>();
-  const double delay_information = 1.0 / (options.delay_prior_m * options.delay_prior_m);
-  own(3, 3) += delay_information;
-  out.gradient[3] -= delay_information * anchor.delay_m;
-  const PriorNormal place = prior_normal(priors_of(flight.anchors[index].id, options), options.outline_m,
-                                         options.outline_sigma_m, anchor.position_m);
-  own.topLeftCorner<3, 3>() += place.information;
-  out.gradient.head<3>() += place.gradient;
-  if (options.dims == Dims::two) {
-    own.row(2).setZero();
-    own.col(2).setZero();
-    own(2, 2) = 1.0;
-    out.shared.row(2).setZero();
-    out.gradient[2] = 0;
-  }
-  // A direction no range sees, as in build_normal.
-  own.topLeftCorner<3, 3>().diagonal().array() +=
-      1e-6 * own.topLeftCorner<3, 3>().diagonal().maxCoeff() + 1e-12;
-  out.own_inverse = own.ldlt().solve(Eigen::Matrix4d::Identity());
+  out.own_inverse = add_anchor_priors(flight.anchors[index].id, anchor, options,
+                                      out.all.topLeftCorner<k_own, k_own>(), out.gradient);
   return out;
 }
 

@@ -19,4 +19,10 @@ WeighedRow weighed_row(const JointRow& row, const JointLine& line, const AnchorB
 /// Variance that a residual is held against: the scale, and what the track adds to what it usually adds, m^2.
 double row_variance_m2(const JointLine& line, const AnchorBlock& block, double scale_m);
 
+/// Adds what is known of an anchor beside its ranges, delay and place, to its normal equations by (x, y, z,
+/// d). returns  their inverse; in the plane the height takes no part
+Eigen::Matrix4d add_anchor_priors(NetworkId id, const JointState::Anchor& anchor,
+                                  const FlightOptions& options, Eigen::Matrix4d own,
+                                  Eigen::Vector4d& gradient);
+
 }  // namespace anchord

@@ -27,7 +27,7 @@ const Gate& gate_named(const AnchorSolution& anchor, const char* name) {
 
 const Gate& scale_gate(const AnchorSolution& anchor) { return gate_named(anchor, "range_scale"); }
 
-/// Antennas of this flight above this height.
+/// Median height of the track.
 double middle_up_m(const FlightData& flight) {
   std::vector<double> ups_m;
   for (const Fix& fix : flight.fixes) ups_m.push_back(fix.local_m.z());
