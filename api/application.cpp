@@ -48,7 +48,7 @@ void Application::start() {
     if (const auto& fault = state_->models.active()->fault; !fault.empty())
       state_->events.add(EventLevel::warning, "model.refused", fault);
     if (!loaded) state_->deps.log_fault("", loaded.error().message);
-    const auto before = promotion_events(state_->stores.models, state_->stores.missions);
+    const auto before = promotion_events(state_->stores.models);
     if (before)
       state_->events.restore(before.value());
     else

@@ -28,6 +28,7 @@ Application::State::State(Deps d)
       steady(*deps.steady),
       late([this](std::string_view what) { deps.log_fault("", what); }),
       prompt(stores.access, late),
+      flight_events(stores.events, late),
       running(stores.service, steady),
       router(
           stores.access, [this] { return running.now_ns(); }, prompt),
@@ -125,8 +126,9 @@ Application::State::State(Deps d)
                 },
                 deps.support_files},
       device_api{deps.devices, seen.measurements, stream, jobs, audit},
-      mission_api{missions,     seen.missions, seen.measurements,    seen.sites, seen.bin, stream, events,
-                  housekeeping, running,       deps.keep_deleted_ns, deps.clock, audit,    flights},
+      mission_api{
+          missions,      seen.missions, seen.measurements, seen.sites,           seen.bin,   stream, events,
+          flight_events, housekeeping,  running,           deps.keep_deleted_ns, deps.clock, audit,  flights},
       measurement_api{seen.measurements, ingest, missions,     models, stores.exclusions, events,
                       deps.clock,        audit,  demonstration},
       anchor_answers(stores.revisions, contradictions),
@@ -166,23 +168,24 @@ Application::State::State(Deps d)
       omlox_api{anchor_api, seen.places, omlox_locations, deps.clock},
       place_api{seen.places, seen.sites, jobs,  deps.run_plan_work,
                 deps.clock,  steady,     audit, [this] { structures.changed(); }},
-      bundle_api{
-          .bundles = stores.bundles,
-          .clock = deps.clock,
-          .audit = audit,
-          .made_by = "anchord " + deps.build.version,
-          .spool = deps.spool_dir,
-          .named = [this](const Request& request) { return named_mission(mission_api, request); },
-          .notes = [this](const Mission& mission,
-                          const Principal& who) { return bundle_notes(events, stores.access, mission, who); },
-          .taken = [this](const MissionId& id, const std::string& text,
-                          bool published) { announce_bundle(calibration_api, id, text, published); },
-          .calibrations = seen.calibrations,
-          .revisions = seen.revisions,
-          .key = signer.key(),
-          .ask = [this](Request& request) { return router.handle(request); },
-          .measurements = seen.measurements,
-          .feature_file = deps.feature_file},
+      bundle_api{.bundles = stores.bundles,
+                 .clock = deps.clock,
+                 .audit = audit,
+                 .made_by = "anchord " + deps.build.version,
+                 .spool = deps.spool_dir,
+                 .named = [this](const Request& request) { return named_mission(mission_api, request); },
+                 .notes =
+                     [this](const Mission& mission, const Principal& who) {
+                       return bundle_notes(flight_events, stores.access, mission, who);
+                     },
+                 .taken = [this](const MissionId& id, const std::string& text,
+                                 bool published) { announce_bundle(calibration_api, id, text, published); },
+                 .calibrations = seen.calibrations,
+                 .revisions = seen.revisions,
+                 .key = signer.key(),
+                 .ask = [this](Request& request) { return router.handle(request); },
+                 .measurements = seen.measurements,
+                 .feature_file = deps.feature_file},
       learning_stores{stores.campaigns, stores.labels, stores.datasets, stores.training_runs, stores.models},
       learning_api{
           learning_stores,
@@ -207,7 +210,10 @@ Application::State::State(Deps d)
     return anchor_file(exchange_api, format, request);
   };
   add_routes();
-  events.on_event([this](const LiveEvent& event) { webhooks.notify(event); });
+  events.on_event([this](const LiveEvent& event) {
+    flight_events.keep(event);
+    webhooks.notify(event);
+  });
 }
 
 std::unique_ptr<WorkDesk> Application::State::make_desk() {

@@ -12,6 +12,7 @@
 #include "api/admin/alarm_board.hpp"
 #include "api/admin/clock_watch.hpp"
 #include "api/admin/event_log.hpp"
+#include "api/admin/flight_events.hpp"
 #include "api/admin/housekeeping.hpp"
 #include "api/admin/job_service.hpp"
 #include "api/admin/routes.hpp"
@@ -88,6 +89,7 @@ struct Application::State {
   const SteadyClock& steady;
   LateWriter late;
   PromptAccessStore prompt;
+  FlightEvents flight_events;
   RunningTime running;
   Router router;
   Hub hub;

@@ -1,24 +1,37 @@
 #include "api/admin/event_log.hpp"
 
 #include <algorithm>
+#include <nlohmann/json.hpp>
 
 #include "api/kit/current_sites.hpp"
 #include "api/stream/hub.hpp"
 #include "api/wire/live_writer.hpp"
 #include "core/base/text.hpp"
+#include "core/base/to_wire.hpp"
 
 namespace anchord::api {
+namespace {
+
+nlohmann::ordered_json place_json(const EventPlace& place) {
+  return {
+      {"lon", place.lon_deg}, {"lat", place.lat_deg}, {"height_above_ground_m", place.height_above_ground_m}};
+}
+
+}  // namespace
 
 std::string event_json(const LiveEvent& event) {
   return R"({"id":")" + to_string(event.id) + R"(","t_us":)" + std::to_string(event.time.us()) +
          R"(,"level":)" + json_text(to_string(event.level)) + R"(,"code":)" + json_text(event.code) +
          R"(,"text":)" + json_text(event.text) + R"(,"mission":)" +
-         (event.mission ? json_text(to_string(*event.mission)) : "null") + '}';
+         (event.mission ? json_text(to_string(*event.mission)) : "null") + R"(,"place":)" +
+         (event.place ? to_wire(place_json(*event.place)) : "null") + '}';
 }
 
-void EventLog::add(EventLevel level, std::string code, std::string text, std::optional<MissionId> mission) {
+void EventLog::add(EventLevel level, std::string code, std::string text, std::optional<MissionId> mission,
+                   std::optional<EventPlace> place) {
   const UtcTime now = clock_.now();
-  const LiveEvent event{make_uuid_v7(now), now, level, std::move(code), std::move(text), mission};
+  const LiveEvent event{
+      EventId{make_uuid_v7(now)}, now, level, std::move(code), std::move(text), mission, place};
   std::string json = event_json(event);
   {
     auto kept = events_.lock();

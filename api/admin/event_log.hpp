@@ -10,20 +10,13 @@
 #include "core/base/ids.hpp"
 #include "core/base/locked.hpp"
 #include "core/base/time.hpp"
-#include "core/types/event_level.hpp"
+#include "core/types/live_event.hpp"
 
 namespace anchord::api {
 
 class Hub;
 
-/// Something an operator should know, as text and as a stable code.
-struct LiveEvent {
-  Uuid id{};
-  UtcTime time{};
-  EventLevel level{};
-  std::string code, text;
-  std::optional<MissionId> mission{};
-};
+/// As the wire has it: id, t_us, level, code, text, mission, place.
 std::string event_json(const LiveEvent& event);
 
 /// The last 10 000 events, also published on topic `events`. Thread-safe.
@@ -33,7 +26,8 @@ class EventLog {
   EventLog(Hub& hub, const Clock& clock) : hub_(hub), clock_(clock) {}
   /// Who is told of every event beside the stream, on the thread that adds it; set once, before the threads.
   void on_event(std::function<void(const LiveEvent&)> tell) { tell_ = std::move(tell); }
-  void add(EventLevel level, std::string code, std::string text, std::optional<MissionId> mission = {});
+  void add(EventLevel level, std::string code, std::string text, std::optional<MissionId> mission = {},
+           std::optional<EventPlace> place = {});
   /// Puts events of before the start in front of all others, oldest first; nobody is told again.
   void restore(const std::vector<LiveEvent>& events);
   /// Newest first.

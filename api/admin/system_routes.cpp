@@ -106,7 +106,10 @@ Response support(AdminApi& s, const Request& request) {
   check_query(request, {});
   std::string alarms, events;
   for (const auto& alarm : s.alarms.standing()) alarms += alarm_json(alarm) + '\n';
-  for (const auto& event : s.events.newest(k_supported_events, {}, {})) events += event_json(event) + '\n';
+  for (auto& event : s.events.newest(k_supported_events, {}, {})) {
+    event.place.reset();
+    events += event_json(event) + '\n';
+  }
   std::vector<SupportFile> files{
       {"README.txt", std::string(k_read_me)},   {"version.json", version(s, request).body},
       {"system.json", system(s, request).body}, {"metrics.txt", metrics(s, request).body},

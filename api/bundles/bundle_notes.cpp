@@ -3,12 +3,14 @@
 #include <nlohmann/json.hpp>
 
 #include "api/admin/event_log.hpp"
+#include "api/admin/flight_events.hpp"
 #include "core/base/to_wire.hpp"
 #include "core/ports/access_store.hpp"
 
 namespace anchord::api {
 namespace {
 
+constexpr std::size_t k_most_events = 100'000;
 constexpr std::size_t k_looked_at = 20'000;  // of the audit log, newest first
 
 void prepend(BundleNote& note, std::string line) {
@@ -18,11 +20,16 @@ void prepend(BundleNote& note, std::string line) {
 
 }  // namespace
 
-std::vector<BundleNote> bundle_notes(const EventLog& events, AccessStore& audit, const Mission& mission,
+std::vector<BundleNote> bundle_notes(const FlightEvents& events, AccessStore& audit, const Mission& mission,
                                      const Principal& who) {
   std::vector<BundleNote> out;
   BundleNote told{"events.ndjson", "", 0};
-  for (const auto& event : events.newest(EventLog::k_kept, mission.id, {})) prepend(told, event_json(event));
+  if (const auto all = events.all(mission.id, k_most_events)) {
+    for (const auto& event : all.value()) {
+      told.text += event_json(event) + '\n';
+      ++told.rows;
+    }
+  }
   out.push_back(std::move(told));
   if (!who.has(Role::admin)) return out;
   const auto entries = audit.audit(k_looked_at);

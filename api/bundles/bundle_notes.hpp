@@ -10,11 +10,11 @@ class AccessStore;
 
 namespace anchord::api {
 
-class EventLog;
+class FlightEvents;
 
 /// What a bundle tells of its flight beside the rows: events.ndjson, and audit.ndjson for who may read the
 /// audit log.
-std::vector<BundleNote> bundle_notes(const EventLog& events, AccessStore& audit, const Mission& mission,
+std::vector<BundleNote> bundle_notes(const FlightEvents& events, AccessStore& audit, const Mission& mission,
                                      const Principal& who);
 
 }  // namespace anchord::api

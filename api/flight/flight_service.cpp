@@ -45,7 +45,7 @@ void FlightService::State::publish_events() {
     events = w->operations.take_events();
   }
   for (auto& event : events)
-    deps.events.add(event.level, std::move(event.code), std::move(event.text), event.mission);
+    deps.events.add(event.level, std::move(event.code), std::move(event.text), event.mission, event.place);
 }
 
 void FlightService::start() {

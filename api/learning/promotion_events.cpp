@@ -1,13 +1,14 @@
 #include "api/learning/promotion_events.hpp"
 
 #include <algorithm>
+#include <utility>
 
 #include "api/learning/model_registry.hpp"
 
 namespace anchord::api {
 namespace {
 
-constexpr std::size_t k_most_promotions = 500, k_most_missions = 500;
+constexpr std::size_t k_most_promotions = 500;
 
 }  // namespace
 
@@ -21,9 +22,8 @@ PromotionWords promotion_words(const Promotion& p, const std::string& method) {
                   : "rolled back: " + p.task + " has no model now"};
 }
 
-Result<std::vector<LiveEvent>> promotion_events(ModelStore& models, MissionStore& missions) {
+Result<std::vector<LiveEvent>> promotion_events(ModelStore& models) {
   BOOST_OUTCOME_TRY(auto promotions, models.promotions("", k_most_promotions));
-  BOOST_OUTCOME_TRY(const auto flights, missions.missions(k_most_missions, std::nullopt));
   std::reverse(promotions.begin(), promotions.end());
   std::vector<LiveEvent> out;
   for (const auto& p : promotions) {
@@ -32,16 +32,12 @@ Result<std::vector<LiveEvent>> promotion_events(ModelStore& models, MissionStore
       BOOST_OUTCOME_TRY(const auto model, models.model(*p.model));
       method = model.method;
     }
-    const auto words = promotion_words(p, method);
-    LiveEvent event{make_uuid_v7(p.time), p.time, EventLevel::info, words.code, words.text, {}};
-    out.push_back(event);
-    if (p.task == k_correction_task) continue;
-    for (const auto& flight : flights) {
-      if (p.time < flight.created || (flight.finished && *flight.finished < p.time)) continue;
-      event.id = make_uuid_v7(p.time);
-      event.mission = flight.id;
-      out.push_back(event);
-    }
+    auto words = promotion_words(p, method);
+    out.push_back({.id = EventId{make_uuid_v7(p.time)},
+                   .time = p.time,
+                   .level = EventLevel::info,
+                   .code = std::move(words.code),
+                   .text = std::move(words.text)});
   }
   return out;
 }

@@ -5,7 +5,6 @@
 
 #include "api/admin/event_log.hpp"
 #include "core/ports/learning_store.hpp"
-#include "core/ports/mission_store.hpp"
 
 namespace anchord::api {
 
@@ -16,9 +15,9 @@ struct PromotionWords {
 /// method  of the model that is active from here on
 PromotionWords promotion_words(const Promotion& promotion, const std::string& method);
 
-/// The newest promotions as events, oldest first: in the log, and in the flights that were recording then.
-/// They are made again from what the store keeps, for a log lives in memory and a switch of models must not
-/// be lost.
-Result<std::vector<LiveEvent>> promotion_events(ModelStore& models, MissionStore& missions);
+/// The newest promotions as events, oldest first. They are made again from what the store keeps, for a log
+/// lives in memory and a switch of models must not be lost; those of flights are kept with them
+/// (api/admin/flight_events).
+Result<std::vector<LiveEvent>> promotion_events(ModelStore& models);
 
 }  // namespace anchord::api

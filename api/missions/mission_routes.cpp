@@ -1,6 +1,7 @@
 #include <nlohmann/json.hpp>
 
 #include "api/admin/event_log.hpp"
+#include "api/admin/flight_events.hpp"
 #include "api/devices/device_stream.hpp"
 #include "api/kit/content_tag.hpp"
 #include "api/kit/current_sites.hpp"
@@ -172,16 +173,29 @@ Response act(MissionApi& s, const Request& request) {
                              : take_devices(s, request, mission, lease);
 }
 
+Ordered event_item(const LiveEvent& event) { return Ordered::parse(event_json(event)); }
+
+/// The newest of this server since its start; those of one flight only, where the query names it.
 Response events(MissionApi& s, const Request& request) {
   check_query(request, {"limit", "since", "mission"});
-  std::optional<MissionId> mission = query_mission(request);
-  if (request.params.count("id") > 0) {
-    mission = named_mission(s, request).id;
-  }
   Ordered items = Ordered::array();
-  for (const auto& event : s.events.newest(page_query(request).limit, mission, query_time(request, "since")))
-    items.push_back(Ordered::parse(event_json(event)));
+  for (const auto& event :
+       s.events.newest(page_query(request).limit, query_mission(request), query_time(request, "since")))
+    items.push_back(event_item(event));
   return list_response(request, std::move(items), "");
+}
+
+/// All of a flight, also of before a restart.
+Response mission_events(MissionApi& s, const Request& request) {
+  check_query(request, {"limit", "cursor", "since"});
+  const auto mission = named_mission(s, request).id;
+  const auto since = query_time(request, "since");
+  return id_page<EventId>(
+      request,
+      [&](std::size_t limit, const std::optional<EventId>& after) {
+        return s.flight_events.newest(mission, limit, since, after);
+      },
+      event_item);
 }
 
 /// What an aircraft in the air is told must not wait behind what begins and ends flights, which reads the
@@ -266,7 +280,7 @@ void add_mission_routes(Router& router, MissionApi& s) {
                 k_command_bytes};
   actions.work_of = work_of_action;
   router.add(keeps_always(std::move(actions)));
-  router.add({Method::get, "/api/v1/missions/{id}/events", readers(), on(events)});
+  router.add({Method::get, "/api/v1/missions/{id}/events", readers(), on(mission_events)});
   router.add(as_heavy({Method::get, "/api/v1/missions/{id}/track", readers(), on(track)}));
   router.add(as_heavy({Method::get, "/api/v1/missions/{id}/estimates", readers(), on(estimates_over_time)}));
   router.add({Method::get, "/api/v1/events", readers(), on(events)});

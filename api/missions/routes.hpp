@@ -24,6 +24,7 @@ namespace anchord::api {
 
 class DeviceStream;
 class EventLog;
+class FlightEvents;
 class Fields;
 class Housekeeping;
 class MissionControl;
@@ -47,6 +48,7 @@ struct MissionApi {
   MissionBin& bin;
   DeviceStream& stream;
   EventLog& events;
+  FlightEvents& flight_events;
   Housekeeping& housekeeping;
   RunningTime& running;
   std::int64_t keep_deleted_ns{0};

@@ -5,11 +5,10 @@
 #include <string>
 #include <string_view>
 
+#include "core/types/live_event.hpp"
 #include "core/types/webhook.hpp"
 
 namespace anchord::api {
-
-struct LiveEvent;
 
 /// What an omlox hub is sent beside revisions: where the tag is now.
 inline constexpr std::string_view k_location_event = "location.updated";

@@ -16,6 +16,11 @@ constexpr double k_in_air_m = 0.7;  ///< by hand: above home this much counts as
 constexpr double k_break_s = 2;     ///< without a fix so long, RTK was not fixed without a break
 constexpr std::size_t k_commands = 60, k_missions = 8, k_numbers = 200;
 
+EventPlace place_of(const Eigen::Vector3d& plan_m, const EnuFrame& frame) {
+  const Wgs84 at = frame.wgs84_from_enu(Enu{plan_m});
+  return {at.lat_deg, at.lon_deg, plan_m.z()};
+}
+
 }  // namespace
 
 bool ActiveFlight::flying() const {
@@ -166,7 +171,9 @@ void Operations::take_events(ActiveFlight& f) {
   for (auto& h : f.control.engine().take_events()) {
     const bool by_the_board =
         h.code.ends_with(".cleared") || std::ranges::find(k_flight_alarms, h.code) != k_flight_alarms.end();
-    if (!by_the_board) log_event(h.level, std::move(h.code), std::move(h.text), f.mission);
+    if (by_the_board) continue;
+    log_event(h.level, std::move(h.code), std::move(h.text), f.mission,
+              h.place_m ? std::optional(place_of(*h.place_m, f.frame)) : std::nullopt);
   }
 }
 

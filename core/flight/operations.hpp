@@ -23,8 +23,8 @@
 #include "core/ports/drone.hpp"
 #include "core/procedure/flight_control.hpp"
 #include "core/procedure/flight_priors.hpp"
-#include "core/types/event_level.hpp"
 #include "core/types/fix.hpp"
+#include "core/types/live_event.hpp"
 #include "core/types/mission.hpp"
 #include "core/types/plan.hpp"
 
@@ -49,6 +49,7 @@ struct LogEvent {
   std::string code;
   std::string text;
   std::optional<MissionId> mission{};
+  std::optional<EventPlace> place{};
 };
 
 /// What became of a flight's plan since the start.
@@ -241,8 +242,9 @@ class Operations {
   std::optional<DroneFence> fence_given(const Plan& plan) const;
   const FlightUpload* uploaded(const Plan& plan, const std::string& what) const;
   std::optional<ChecklistItem> fence_item(const Plan& plan) const;
-  void log_event(EventLevel level, std::string code, std::string text, std::optional<MissionId> mission) {
-    events_.push_back({level, std::move(code), std::move(text), std::move(mission)});
+  void log_event(EventLevel level, std::string code, std::string text, std::optional<MissionId> mission,
+                 std::optional<EventPlace> place = {}) {
+    events_.push_back({level, std::move(code), std::move(text), std::move(mission), place});
   }
 
   Drone* drone_;

@@ -8,6 +8,7 @@ class BundleStore;
 class CalibrationStore;
 class CampaignStore;
 class DatasetStore;
+class EventStore;
 class ExclusionStore;
 class FrameStore;
 class JobStore;
@@ -32,6 +33,7 @@ struct Stores {
   MissionStore& missions;
   MissionBin& bin;
   ExclusionStore& exclusions;
+  EventStore& events;
   SiteStore& sites;
   AnchorStore& anchors;
   CalibrationStore& calibrations;

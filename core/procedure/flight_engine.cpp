@@ -102,8 +102,9 @@ double FlightEngine::elapsed_s() const { return started_s_ ? state_.since_s - *s
 std::vector<Command> FlightEngine::take_commands() { return std::exchange(orders_, {}); }
 std::vector<Event> FlightEngine::take_events() { return std::exchange(events_, {}); }
 
-void FlightEngine::report(double now_s, EventLevel level, std::string code, std::string text) {
-  events_.push_back({now_s, level, std::move(code), std::move(text)});
+void FlightEngine::report(double now_s, EventLevel level, std::string code, std::string text,
+                          std::optional<Eigen::Vector3d> place_m) {
+  events_.push_back({now_s, level, std::move(code), std::move(text), place_m});
 }
 
 void FlightEngine::fix(double now_s, const Eigen::Vector3d& enu_m, FixClass fix) {
@@ -251,7 +252,9 @@ void FlightEngine::apply(double now_s, const Advance& step) {
   point_task_.reset();
   asked_.reset();
   answer_.reset();
-  report(now_s, EventLevel::info, "procedure." + std::string(to_string(state_.step)), state_.reason);
+  const auto sent = std::ranges::find(step.commands, Command::Kind::go_to, &Command::kind);
+  report(now_s, EventLevel::info, "procedure." + std::string(to_string(state_.step)), state_.reason,
+         sent == step.commands.end() ? std::nullopt : std::optional(sent->point_m));
   for (const auto& c : step.commands) execute(now_s, c);
 }
 

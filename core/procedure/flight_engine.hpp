@@ -86,6 +86,7 @@ struct Event {
   EventLevel level{};
   std::string code;
   std::string text;
+  std::optional<Eigen::Vector3d> place_m{};  ///< where the aircraft is sent by it, in the plan's frame
 };
 
 /// Runs one flight: machine, guard, watch, planner and route together. Driven by calls alone: no clock, no
@@ -165,7 +166,8 @@ class FlightEngine {
   void climb(double now_s);
   bool end_of_time(double now_s, std::span<const Estimate> estimates);
   bool down(double now_s);
-  void report(double now_s, EventLevel level, std::string code, std::string text);
+  void report(double now_s, EventLevel level, std::string code, std::string text,
+              std::optional<Eigen::Vector3d> place_m = {});
   void monitor(double now_s);
   bool lands_by_itself() const;
   void note_lobes();

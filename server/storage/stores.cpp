@@ -9,6 +9,7 @@ SqlStores::SqlStores(Gate& gate, AdmitMission admit)
       missions(make_mission_store(gate, std::move(admit))),
       bin(make_mission_bin(gate)),
       exclusions(make_exclusion_store(gate)),
+      events(make_event_store(gate)),
       sites(make_site_store(gate)),
       anchors(make_anchor_store(gate)),
       calibrations(make_calibration_store(gate)),
@@ -28,8 +29,8 @@ SqlStores::SqlStores(Gate& gate, AdmitMission admit)
       webhooks(make_webhook_store(gate)),
       places(make_place_store(gate)),
       bundles(make_bundle_store(gate)),
-      ports{*measurements, *missions, *bin,    *exclusions, *sites,    *anchors,  *calibrations,  *revisions,
-            *kits,         *frames,   *plans,  *campaigns,  *labels,   *datasets, *training_runs, *models,
-            *jobs,         *tokens,   *access, *service,    *webhooks, *places,   *bundles} {}
+      ports{*measurements, *missions, *bin,    *exclusions, *events,    *sites,    *anchors,  *calibrations,
+            *revisions,    *kits,     *frames, *plans,      *campaigns, *labels,   *datasets, *training_runs,
+            *models,       *jobs,     *tokens, *access,     *service,   *webhooks, *places,   *bundles} {}
 
 }  // namespace anchord::sql

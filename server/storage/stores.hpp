@@ -7,6 +7,7 @@
 #include "core/ports/anchor_store.hpp"
 #include "core/ports/bundle_store.hpp"
 #include "core/ports/calibration_store.hpp"
+#include "core/ports/event_store.hpp"
 #include "core/ports/exclusion_store.hpp"
 #include "core/ports/frame_store.hpp"
 #include "core/ports/job_store.hpp"
@@ -50,6 +51,7 @@ std::unique_ptr<PlanStore> make_plan_store(Gate& gate);
 std::unique_ptr<MissionBin> make_mission_bin(Gate& gate);
 std::unique_ptr<ServiceStore> make_service_store(Gate& gate);
 std::unique_ptr<ExclusionStore> make_exclusion_store(Gate& gate);
+std::unique_ptr<EventStore> make_event_store(Gate& gate);
 std::unique_ptr<WebhookStore> make_webhook_store(Gate& gate);
 std::unique_ptr<PlaceStore> make_place_store(Gate& gate);
 std::unique_ptr<BundleStore> make_bundle_store(Gate& gate);
@@ -61,6 +63,7 @@ struct SqlStores {
   const std::unique_ptr<MissionStore> missions;
   const std::unique_ptr<MissionBin> bin;
   const std::unique_ptr<ExclusionStore> exclusions;
+  const std::unique_ptr<EventStore> events;
   const std::unique_ptr<SiteStore> sites;
   const std::unique_ptr<AnchorStore> anchors;
   const std::unique_ptr<CalibrationStore> calibrations;

@@ -139,3 +139,21 @@ test('while it plays, jumps and ends the strip says REPLAY; no command is there,
   await eventually('LIVE', async () => (await text(id('status-link'))).includes('LIVE'), 10_000);
   await page.close();
 });
+
+test('after a restart the replay still shows procedure, its reason and the point it flew to', async () => {
+  const before = (await get(`/api/v1/missions/${mission}/events?limit=1000`)).items,
+    sent = before.filter((e) => e.place);
+  assert.ok(sent.length > 0, 'the aircraft was sent somewhere');
+  await server.restart();
+  const after_it = (await get(`/api/v1/missions/${mission}/events?limit=1000`)).items,
+    kept = new Map(after_it.map((e) => [e.id, e]));
+  for (const event of before) assert.deepEqual(kept.get(event.id), event, 'as it was');
+  const { page, seen, id } = await opened();
+  await id('scrubber').press('End');
+  await id('replay-procedure').waitFor({ timeout: 10_000 });
+  assert.match(await text(id('replay-procedure')), /\w{4}/);
+  assert.ok((await id('replay-events').locator('li').count()) > 0, 'events are listed');
+  await picture(page, 'replay-after-restart');
+  assert.deepEqual(seen.errors, []);
+  await page.close();
+});

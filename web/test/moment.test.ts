@@ -1,8 +1,14 @@
 import { expect, it } from 'vitest';
-import { alarms_at, decision_at, procedure_at } from '../src/state/moment';
+import { alarms_at, decision_at, places_at, procedure_at } from '../src/state/moment';
 import type { Mark } from '../src/state/recording';
 
-const at = (s: number, code: string, text: string, level = 'info'): Mark => ({ t_us: s * 1e6, code, text, level });
+const at = (s: number, code: string, text: string, level = 'info', place: Mark['place'] = null): Mark => ({
+  t_us: s * 1e6,
+  code,
+  text,
+  level,
+  place,
+});
 const marks = [
   at(1, 'control.taken', 'operator has control'),
   at(5, 'procedure.take_off', 'started by the operator'),
@@ -63,4 +69,33 @@ it('knows what was last decided about where to measure next, until the way home 
   expect(decision_at(decided, 50.5e6)?.text).toMatch(/^better point found/);
   expect(decision_at(decided, 60e6)?.text).toMatch(/^enough here/);
   expect(decision_at(decided, 71e6)).toBeNull();
+});
+
+it('knows where the aircraft was sent to then, and where it had measured', () => {
+  const sent = (s: number, step: string, lon: number): Mark => at(s, `procedure.${step}`, '', 'info', { lon, lat: 51 }),
+    way = [
+      at(1, 'procedure.take_off', ''),
+      sent(10, 'go_to_waypoint', 3.1),
+      at(20, 'procedure.ranging', ''),
+      at(25, 'procedure.find_next_point', ''),
+      sent(26, 'go_to_point', 3.2),
+      at(30, 'rtk.lost', 'an event of something else'),
+      at(40, 'procedure.hold', ''),
+      sent(45, 'go_to_point', 3.2),
+      at(50, 'procedure.ranging', ''),
+      at(60, 'procedure.return_home', ''),
+      at(99, 'procedure.take_off', 'a second flight'),
+    ],
+    lon = (s: number) => {
+      const p = places_at(way, s * 1e6);
+      return [p.target?.lon ?? null, p.measured.map((m) => m.lon)];
+    };
+  expect(lon(5)).toEqual([null, []]);
+  expect(lon(12)).toEqual([3.1, []]);
+  expect(lon(25)).toEqual([3.1, [3.1]]);
+  expect(lon(31)).toEqual([3.2, [3.1]]);
+  expect(lon(41)).toEqual([null, [3.1]]);
+  expect(lon(55)).toEqual([3.2, [3.1, 3.2]]);
+  expect(lon(61)).toEqual([null, [3.1, 3.2]]);
+  expect(lon(99)).toEqual([null, []]);
 });

@@ -1,4 +1,5 @@
 // Plans, exclusions, labels, filters of measurements and the outbox of webhooks, over every backend.
+#include "core/ports/event_store.hpp"
 #include "core/ports/exclusion_store.hpp"
 #include "core/ports/learning_store.hpp"
 #include "core/ports/plan_store.hpp"
@@ -16,6 +17,7 @@ class FlightStoreContract : public StoreContract {
  protected:
   PlanStore& plans() { return db_->stores().plans; }
   ExclusionStore& exclusions() { return db_->stores().exclusions; }
+  EventStore& events() { return db_->stores().events; }
   WebhookStore& webhooks() { return db_->stores().webhooks; }
 
   StoredPlan plan(const std::string& name) {
@@ -177,6 +179,45 @@ TEST_P(FlightStoreContract, FiltersRangesByDistanceLevelAndLabel) {
   EXPECT_EQ(count({{}, {}, {}, {}, Label::los}), 1u);
   EXPECT_EQ(count({{}, {}, {}, {}, Label::nlos}), 0u);
   EXPECT_EQ(count({{}, {}, {}, {}, Label::none}), 5u);
+}
+
+TEST_P(FlightStoreContract, KeepsTheEventsOfAFlightInTheOrderInWhichTheyCame) {
+  const Mission m = stored_mission(), other = stored_mission();
+  const auto event = [&](const MissionId& mission, std::int64_t after_s, const std::string& text) {
+    LiveEvent e;
+    e.time = UtcTime{k_noon.ns + after_s * 1'000'000'000};
+    e.id = EventId{make_uuid_v7(e.time)};
+    e.level = EventLevel::warning;
+    e.code = "procedure.hold";
+    e.text = text;
+    e.mission = mission;
+    return e;
+  };
+  LiveEvent sent = event(m.id, 1, "to Z\u00fcrich \"2\"");
+  sent.place = {51.25, -179.5, 7.125};
+  // The clock was set back between the second and the third.
+  const std::vector<LiveEvent> all{event(m.id, 0, "a"), sent, event(m.id, -60, "c"),
+                                   event(other.id, 0, "of another"), event(MissionId{}, 0, "of none")};
+  ASSERT_TRUE(events().append(all));
+  ASSERT_TRUE(events().append(std::span(all).first(2))) << "what is there stays";
+  const auto read = events().events(m.id, 10, std::nullopt, std::nullopt).value();
+  ASSERT_EQ(read.size(), 3u);
+  EXPECT_EQ(read[0].text, "c");
+  EXPECT_EQ(read[1].text, sent.text);
+  EXPECT_EQ(read[1].id, sent.id);
+  EXPECT_EQ(read[1].time, sent.time);
+  EXPECT_EQ(read[1].level, EventLevel::warning);
+  EXPECT_EQ(read[1].code, sent.code);
+  EXPECT_EQ(read[1].mission, m.id);
+  ASSERT_TRUE(read[1].place);
+  EXPECT_EQ(read[1].place->lat_deg, 51.25);
+  EXPECT_EQ(read[1].place->lon_deg, -179.5);
+  EXPECT_EQ(read[1].place->height_above_ground_m, 7.125);
+  EXPECT_FALSE(read[2].place);
+  EXPECT_EQ(events().events(m.id, 1, std::nullopt, read[0].id).value().at(0).text, sent.text);
+  EXPECT_TRUE(events().events(m.id, 10, std::nullopt, all[3].id).value().empty()) << "of another flight";
+  EXPECT_EQ(events().events(m.id, 10, k_noon, std::nullopt).value().size(), 2u);
+  EXPECT_TRUE(events().events(MissionId{}, 10, std::nullopt, std::nullopt).value().empty());
 }
 
 TEST_P(FlightStoreContract, KeepsWebhooksInOrderAndTheirVersions) {

@@ -52,6 +52,25 @@ export function decision_at(marks: readonly Mark[], t_us: number): Mark | null {
   return decided;
 }
 
+const ELSEWHERE: readonly Step[] = ['take_off', 'hold', 'return_home', 'landing', 'done'];
+/// Where the aircraft was sent to or stood at, and where it had measured by then; of the last take-off before the moment.
+export function places_at(
+  marks: readonly Mark[],
+  t_us: number,
+): { readonly target: Mark['place']; readonly measured: readonly NonNullable<Mark['place']>[] } {
+  let target: Mark['place'] = null,
+    measured: NonNullable<Mark['place']>[] = [];
+  for (const m of marks) {
+    if (m.t_us > t_us) break;
+    const step = step_of(m);
+    if (step === 'ranging' && target && !measured.includes(target)) measured.push(target);
+    if (step === 'take_off') measured = [];
+    if (m.place) target = m.place;
+    else if (step && ELSEWHERE.includes(step)) target = null;
+  }
+  return { target, measured };
+}
+
 const PRIORITY: Readonly<Record<string, Priority>> = { critical: 'critical', warning: 'warning' };
 /// Newest last, their `since_ms` by the clock of the flight. "alarm.raised" says "id: what is wrong", "alarm.cleared" "id is over".
 export function alarms_at(marks: readonly Mark[], t_us: number): Alarm[] {

@@ -21,11 +21,16 @@ import type { Topic } from '../live/stream';
 import { enu_from_geodetic, type Geodetic } from '../map/enu';
 import { Scene } from './scene';
 
+interface Lonlat {
+  readonly lon: number;
+  readonly lat: number;
+}
 export interface Mark {
   readonly t_us: number;
   readonly level: string;
   readonly code: string;
   readonly text: string;
+  readonly place: Lonlat | null; ///< where the aircraft is sent by it
 }
 export interface Recording {
   readonly mission: MissionMsg;
@@ -124,6 +129,12 @@ export const range_of =
         };
   };
 
+const place_of = (place: unknown): Lonlat | null => {
+  const o = obj(place),
+    [lon, lat] = [num(o?.lon), num(o?.lat)];
+  return lon === null || lat === null ? null : { lon, lat };
+};
+
 /// Events within the recording, in the order of the flight: the server gives the newest first.
 export const marks_of = (
   events: readonly Unchecked<Wire<'Event'>>[],
@@ -131,7 +142,13 @@ export const marks_of = (
   to_us: number,
 ): Recording['marks'] =>
   objects(events)
-    .map((e) => ({ t_us: count(e.t_us), level: str(e.level), code: str(e.code), text: str(e.text) }))
+    .map((e) => ({
+      t_us: count(e.t_us),
+      level: str(e.level),
+      code: str(e.code),
+      text: str(e.text),
+      place: place_of(e.place),
+    }))
     .filter((e) => e.t_us >= from_us && e.t_us <= to_us)
     .sort((a, b) => a.t_us - b.t_us);
 
@@ -144,7 +161,12 @@ export async function load_recording(mission: MissionMsg): Promise<Recording> {
       (row) => row,
     ),
     pages((query) => get('/ranges', { query: { ...query, predicted: true } }), of, range_of(of)),
-    list('/missions/{id}/events', { path: { id: of }, query: { limit: 1000 } }).catch(() => []),
+    pages(
+      ({ cursor }) =>
+        get('/missions/{id}/events', { path: { id: of }, query: { limit: 1000, ...(cursor ? { cursor } : {}) } }),
+      of,
+      (row) => row,
+    ).catch(() => ({ rows: [] })),
   ]);
   const poses = poses_of(fixes.rows, mission.mission, mission.origin),
     by_time = (a: { t_us: number }, b: { t_us: number }): number => a.t_us - b.t_us;
@@ -161,7 +183,7 @@ export async function load_recording(mission: MissionMsg): Promise<Recording> {
     poses: poses.sort(by_time),
     ranges: ranges.rows.sort(by_time),
     cut: fixes.cut || ranges.cut,
-    marks: marks_of(events, Math.min(...times), Math.max(...times)),
+    marks: marks_of(events.rows, Math.min(...times), Math.max(...times)),
   };
 }
 

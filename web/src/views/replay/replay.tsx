@@ -8,6 +8,7 @@ import { after, estimates_over_time, load_recording, neighbour, Player } from '.
 import { shown_estimates } from '../../state/done';
 import { backdrops } from '../../state/floors';
 import { alarms_at, decision_at, procedure_at, status_of } from '../../state/moment';
+import { flown_picture } from './picture';
 import { Scene } from '../../state/scene';
 import {
   chosen_anchor,
@@ -230,6 +231,7 @@ export function Replay({ id }: { id: string | null }) {
             scene: player?.scene ?? null,
             link_lost: watched_lost(),
             running: true,
+            flight: player && flown_picture(player.recording, player.t_us),
             backdrops: backdrops(mission.origin),
           })}
           onSelect={(a) => (chosen_anchor.value = a)}
@@ -358,7 +360,9 @@ function Then({ player }: { player: Player }) {
               {sentence(decided.text)} Decided at {clock((decided.t_us - player.recording.from_us) / 1e6)}.
             </p>
           )}
-          <p class="why mut">The candidates for the next point are shown only during a flight and are not stored.</p>
+          <p class="why mut">
+            The point it flies to is marked on the map. The other candidates are shown only during a flight.
+          </p>
         </section>
       )}
     </>
