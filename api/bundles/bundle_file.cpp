@@ -1,83 +1,68 @@
 #include "api/bundles/bundle_file.hpp"
 
 #include <cerrno>
-#include <fstream>
 
 #include "api/bundles/spool.hpp"
-#include "core/base/sha256.hpp"
 
 namespace anchord::api {
 namespace {
 
 constexpr std::size_t k_write_bytes = std::size_t{1} << 20;
 
-/// One file a table, with its digest.
-class FolderSink final : public BundleSink {
- public:
-  FolderSink(const SpoolFolder& folder, std::vector<BundleEntry>& entries)
-      : folder_(folder), entries_(entries) {}
-
-  Result<void> begin(const BundleTable& table) override {
-    BOOST_OUTCOME_TRY(end());
-    table_ = &table;
-    entry_ = {bundle_entry_name(table), 0, 0, ""};
-    file_ = std::ofstream(folder_.path(table.name), std::ios::binary);
-    if (!file_) return failed();
-    sum_ = Sha256();
-    text_.clear();
-    width_.reset();
-    return boost::outcome_v2::success();
-  }
-  Result<void> row(const BundleRow& row) override {
-    if (++entry_.rows > k_bundle_rows)
-      return make_error(Errc::unsupported, "the mission has more than " + std::to_string(k_bundle_rows) +
-                                               " rows of " + table_->name + ", more than a bundle can hold");
-    if (!width_) begin_text(&row);
-    text_ += bundle_line(*table_, row, *width_);
-    if (text_.size() < k_write_bytes) return boost::outcome_v2::success();
-    return flush();
-  }
-  Result<void> end() {
-    if (table_ == nullptr) return boost::outcome_v2::success();
-    if (!width_) begin_text(nullptr);
-    BOOST_OUTCOME_TRY(flush());
-    file_.close();
-    if (!file_) return failed();
-    entry_.sha256_hex = sum_.hex();
-    entries_.push_back(entry_);
-    table_ = nullptr;
-    return boost::outcome_v2::success();
-  }
-
- private:
-  void begin_text(const BundleRow* first) {
-    width_ = bundle_width(*table_, first);
-    text_ = bundle_header(*table_, *width_);
-  }
-  Result<void> flush() {
-    sum_.add(text_);
-    entry_.bytes += text_.size();
-    errno = 0;
-    if (!file_.write(text_.data(), static_cast<std::streamsize>(text_.size()))) return failed();
-    text_.clear();
-    return boost::outcome_v2::success();
-  }
-  Error failed() const {
-    return make_error(errno == ENOSPC ? Errc::storage_full : Errc::storage_unavailable,
-                      "cannot write " + entry_.name + " of the bundle");
-  }
-
-  const SpoolFolder& folder_;
-  std::vector<BundleEntry>& entries_;
-  const BundleTable* table_{nullptr};
-  BundleEntry entry_;
-  std::ofstream file_;
-  Sha256 sum_;
-  std::string text_;
-  std::optional<std::size_t> width_;  ///< columns, known with the first row
-};
-
 }  // namespace
+
+Result<void> FolderSink::begin(const BundleTable& table) {
+  BOOST_OUTCOME_TRY(end());
+  table_ = &table;
+  entry_ = {bundle_entry_name(table), 0, 0, ""};
+  file_ = std::ofstream(folder_.path(table.name), std::ios::binary);
+  if (!file_) return failed();
+  sum_ = Sha256();
+  text_.clear();
+  width_.reset();
+  return boost::outcome_v2::success();
+}
+
+Result<void> FolderSink::row(const BundleRow& row) {
+  if (++entry_.rows > k_bundle_rows)
+    return make_error(Errc::unsupported, "there are more than " + std::to_string(k_bundle_rows) +
+                                             " rows of " + table_->name + ", more than a bundle can hold");
+  if (!width_) begin_text(&row);
+  text_ += bundle_line(*table_, row, *width_);
+  if (text_.size() < k_write_bytes) return boost::outcome_v2::success();
+  return flush();
+}
+
+Result<void> FolderSink::end() {
+  if (table_ == nullptr) return boost::outcome_v2::success();
+  if (!width_) begin_text(nullptr);
+  BOOST_OUTCOME_TRY(flush());
+  file_.close();
+  if (!file_) return failed();
+  entry_.sha256_hex = sum_.hex();
+  entries_.push_back(entry_);
+  table_ = nullptr;
+  return boost::outcome_v2::success();
+}
+
+void FolderSink::begin_text(const BundleRow* first) {
+  width_ = bundle_width(*table_, first);
+  text_ = bundle_header(*table_, *width_);
+}
+
+Result<void> FolderSink::flush() {
+  sum_.add(text_);
+  entry_.bytes += text_.size();
+  errno = 0;
+  if (!file_.write(text_.data(), static_cast<std::streamsize>(text_.size()))) return failed();
+  text_.clear();
+  return boost::outcome_v2::success();
+}
+
+Error FolderSink::failed() const {
+  return make_error(errno == ENOSPC ? Errc::storage_full : Errc::storage_unavailable,
+                    "cannot write " + entry_.name + " of the bundle");
+}
 
 Result<std::filesystem::path> make_bundle(BundleApi& api, const Mission& mission, const Principal& who,
                                           const SpoolFolder& folder) {

@@ -1,9 +1,15 @@
 #pragma once
 
+#include <cstddef>
 #include <filesystem>
+#include <fstream>
+#include <optional>
+#include <string>
+#include <vector>
 
 #include "api/bundles/routes.hpp"
 #include "api/formats/bundle.hpp"
+#include "core/base/sha256.hpp"
 #include "core/ports/bundle_store.hpp"
 
 namespace anchord::api {
@@ -13,6 +19,33 @@ class SpoolFolder;
 /// Rows a table may have: what one transaction takes in without the server's other writes waiting for long.
 inline constexpr std::uint64_t k_bundle_rows = 5'000'000;
 inline constexpr std::uint64_t k_bundle_bytes = std::uint64_t{2} << 30;  ///< of the file
+
+inline constexpr std::size_t k_site_entries = 5000;  ///< of a site's bundle
+
+/// Writes the rows into files of a folder, one a table, and an entry of the manifest for each.
+class FolderSink final : public BundleSink {
+ public:
+  FolderSink(const SpoolFolder& folder, std::vector<BundleEntry>& entries)
+      : folder_(folder), entries_(entries) {}
+  Result<void> begin(const BundleTable& table) override;
+  Result<void> row(const BundleRow& row) override;
+  /// After the last row.
+  Result<void> end();
+
+ private:
+  void begin_text(const BundleRow* first);
+  Result<void> flush();
+  Error failed() const;
+
+  const SpoolFolder& folder_;
+  std::vector<BundleEntry>& entries_;
+  const BundleTable* table_{nullptr};
+  BundleEntry entry_;
+  std::ofstream file_;
+  Sha256 sum_;
+  std::string text_;
+  std::optional<std::size_t> width_;  ///< columns, known with the first row
+};
 
 /// A bundle in the folder; its path. errors: those of BundleStore::write_out and ZipWriter
 Result<std::filesystem::path> make_bundle(BundleApi& api, const Mission& mission, const Principal& who,

@@ -1,9 +1,12 @@
 #include "api/bundles/bundle_notes.hpp"
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
 
 #include "api/admin/event_log.hpp"
 #include "api/admin/flight_events.hpp"
+#include "api/formats/bundle.hpp"
+#include "api/kit/reader.hpp"
 #include "core/base/to_wire.hpp"
 #include "core/ports/access_store.hpp"
 
@@ -12,6 +15,40 @@ namespace {
 
 constexpr std::size_t k_most_events = 100'000;
 constexpr std::size_t k_looked_at = 20'000;  // of the audit log, newest first
+
+constexpr const char* k_events = "events.ndjson";
+constexpr std::size_t k_code_bytes = 100, k_text_bytes = 10'000;
+constexpr std::int64_t k_latest_us = 9'000'000'000'000'000;  // in the year 2255, still nanoseconds in 64 bits
+
+std::optional<EventPlace> read_place(const nlohmann::json* place, std::vector<FieldError>& errors) {
+  if (place == nullptr) return std::nullopt;
+  Fields fields(*place, "/place", errors);
+  const auto lon_deg = fields.number("lon", -180, 180, true), lat_deg = fields.number("lat", -90, 90, true),
+             height_m = fields.number("height_above_ground_m", -10'000, 10'000, true);
+  if (!lon_deg || !lat_deg || !height_m) return std::nullopt;
+  return EventPlace{*lat_deg, *lon_deg, *height_m};
+}
+
+/// A line of events.ndjson. Members that came later than this version are left alone.
+std::optional<LiveEvent> read_event(std::string_view line, const MissionId& mission) {
+  nlohmann::json json;
+  if (parse_json(line, json)) return std::nullopt;
+  std::vector<FieldError> errors;
+  Fields fields(json, "", errors);
+  const auto id = parse_uuid(fields.text("id", 40, true).value_or(""));
+  const auto t_us = fields.integer("t_us", 0, k_latest_us, true);
+  const auto level = fields.word("level", k_event_level_words, true);
+  auto code = fields.text("code", k_code_bytes, true), text = fields.text("text", k_text_bytes, true);
+  const auto place = read_place(fields.child("place"), errors);
+  if (!errors.empty() || !id) return std::nullopt;
+  return LiveEvent{.id = EventId{id.value()},
+                   .time = UtcTime::from_us(*t_us),
+                   .level = *level,
+                   .code = *std::move(code),
+                   .text = *std::move(text),
+                   .mission = mission,
+                   .place = place};
+}
 
 void prepend(BundleNote& note, std::string line) {
   note.text.insert(0, std::move(line) + '\n');
@@ -23,7 +60,7 @@ void prepend(BundleNote& note, std::string line) {
 std::vector<BundleNote> bundle_notes(const FlightEvents& events, AccessStore& audit, const Mission& mission,
                                      const Principal& who) {
   std::vector<BundleNote> out;
-  BundleNote told{"events.ndjson", "", 0};
+  BundleNote told{k_events, "", 0};
   if (const auto all = events.all(mission.id, k_most_events)) {
     for (const auto& event : all.value()) {
       told.text += event_json(event) + '\n';
@@ -46,6 +83,23 @@ std::vector<BundleNote> bundle_notes(const FlightEvents& events, AccessStore& au
   }
   out.push_back(std::move(log));
   return out;
+}
+
+Result<std::vector<LiveEvent>> noted_events(const ZipReader& zip, const BundleManifest& manifest) {
+  std::vector<LiveEvent> out;
+  const std::string name = std::string(k_bundle_notes) + k_events;
+  if (std::ranges::find(manifest.entries, name, &BundleEntry::name) == manifest.entries.end()) return out;
+  BOOST_OUTCOME_TRY(auto lines, ZipLines::open(zip, name));
+  std::string_view line;
+  for (;;) {
+    BOOST_OUTCOME_TRY(const bool more, lines.next(line));
+    if (!more) return out;
+    auto event = read_event(line, manifest.mission);
+    if (!event || out.size() >= k_most_events)
+      return make_error(Errc::bad_frame, name + " line " + std::to_string(lines.number()) +
+                                             (event ? ": more than 100000 events" : ": not an event"));
+    out.push_back(*std::move(event));
+  }
 }
 
 }  // namespace anchord::api

@@ -1,8 +1,10 @@
 #pragma once
 
+#include <string>
 #include <vector>
 
 #include "api/bundles/routes.hpp"
+#include "core/types/live_event.hpp"
 
 namespace anchord {
 class AccessStore;
@@ -11,10 +13,16 @@ class AccessStore;
 namespace anchord::api {
 
 class FlightEvents;
+class ZipReader;
+struct BundleManifest;
 
 /// What a bundle tells of its flight beside the rows: events.ndjson, and audit.ndjson for who may read the
 /// audit log.
 std::vector<BundleNote> bundle_notes(const FlightEvents& events, AccessStore& audit, const Mission& mission,
                                      const Principal& who);
+
+/// The events that a bundle tells of its flight, in the order in which they came; none where it has no such
+/// note. errors: those of the zip file; bad_frame, naming the line that is none
+Result<std::vector<LiveEvent>> noted_events(const ZipReader& zip, const BundleManifest& manifest);
 
 }  // namespace anchord::api

@@ -3,12 +3,15 @@
 #include <nlohmann/json.hpp>
 
 #include "api/bundles/bundle_file.hpp"
+#include "api/bundles/bundle_import.hpp"
 #include "api/bundles/range_table.hpp"
 #include "api/bundles/routes.hpp"
+#include "api/bundles/site_bundle.hpp"
 #include "api/bundles/spool.hpp"
 #include "api/kit/reader.hpp"
 #include "api/kit/support.hpp"
 #include "core/base/text.hpp"
+#include "core/ports/site_store.hpp"
 
 namespace anchord::api {
 namespace {
@@ -21,6 +24,14 @@ Response bundle(BundleApi& s, const Request& request) {
   auto folder = value_or_problem(SpoolFolder::make(s.spool));
   const auto file = value_or_problem(make_bundle(s, mission, request.principal, *folder));
   return file_answer(std::move(folder), file, k_bundle_type, "mission-" + to_string(mission.id) + ".anchord");
+}
+
+Response site_bundle(BundleApi& s, const Request& request) {
+  check_query(request, {});
+  const Site site = value_or_problem(s.sites.site(path_id<SiteId>(request)));
+  auto folder = value_or_problem(SpoolFolder::make(s.spool));
+  const auto file = value_or_problem(make_site_bundle(s, site, request.principal, *folder));
+  return file_answer(std::move(folder), file, k_site_bundle_type, "site-" + to_string(site.id) + ".anchord");
 }
 
 Response ranges_file(BundleApi& s, const Request& request) {
@@ -47,62 +58,57 @@ T value_or_refusal(Result<T> result) {
   return std::move(result).value();
 }
 
-/// Every table once, and beside them notes alone.
-void check_entries(const BundleStore& store, const BundleManifest& manifest) {
-  std::string wrong;
-  for (const auto& table : store.tables()) {
-    if (std::ranges::find(manifest.entries, bundle_entry_name(table), &BundleEntry::name) ==
-        manifest.entries.end())
-      wrong += (wrong.empty() ? "" : ", ") + bundle_entry_name(table) + " is missing";
-  }
-  for (const auto& entry : manifest.entries) {
-    const bool table = std::ranges::any_of(
-        store.tables(), [&](const BundleTable& t) { return bundle_entry_name(t) == entry.name; });
-    if (!table && !entry.name.starts_with(k_bundle_notes))
-      wrong += (wrong.empty() ? "" : ", ") + entry.name + " is not part of a bundle";
-  }
-  if (!wrong.empty()) refuse(make_error(Errc::bad_frame, wrong));
+Ordered with(Ordered head, const Ordered& rest) {
+  head.update(rest);
+  return head;
 }
 
-Ordered outcome_json(const BundleManifest& manifest, const BundleOutcome& outcome) {
-  Ordered rows = Ordered::object(), added = Ordered::object(), left_out = Ordered::array();
-  for (const auto& table : outcome.tables) {
-    if (table.n_rows > 0) rows[table.name] = table.n_rows;
-    if (table.n_added > 0) added[table.name] = table.n_added;
-  }
-  for (const auto& one : outcome.left_out) left_out.push_back({{"what", one.what}, {"why", one.why}});
-  return {{"mission", to_string(manifest.mission)},
-          {"digest", "sha256:" + bundle_digest(manifest)},
-          {"already", !outcome.added()},
-          {"rows", std::move(rows)},
-          {"added", std::move(added)},
-          {"left_out", std::move(left_out)}};
+Response flight_taken(BundleApi& s, const Request& request, const ZipReader& zip) {
+  const auto manifest = value_or_refusal(checked_flight(s.bundles, zip));
+  const auto outcome = value_or_refusal(take_flight(s, request, zip, manifest));
+  Response response = json_response(
+      outcome.added() ? 201 : 200,
+      with({{"mission", to_string(manifest.mission)}, {"digest", "sha256:" + bundle_digest(manifest)}},
+           outcome_json(outcome)));
+  response.header("Location", "/api/v1/missions/" + to_string(manifest.mission));
+  return response;
 }
 
+Response site_taken(BundleApi& s, const Request& request, const ZipReader& zip, const SpoolFolder& folder) {
+  const auto manifest = value_or_refusal(checked_site_bundle(zip));
+  const auto import = value_or_refusal(take_site_bundle(s, request, zip, manifest, folder));
+  Ordered flights = Ordered::array();
+  std::string refused;
+  for (const auto& flight : import.flights) {
+    if (!flight.outcome) refused += (refused.empty() ? "" : "; ") + flight.refused;
+    if (flight.outcome)
+      flights.push_back(with({{"mission", to_string(flight.mission)}, {"name", to_utf8(flight.name, 200)}},
+                             outcome_json(*flight.outcome)));
+  }
+  if (!refused.empty())
+    throw_problem(409, "conflict",
+                  refused + ". The other flights of the bundle and the site are on this server now");
+  Response response = json_response(
+      import.added() ? 201 : 200,
+      with(with({{"site", to_string(manifest.site)}, {"digest", "sha256:" + site_bundle_digest(manifest)}},
+                outcome_json(import.site)),
+           {{"already", !import.added()}, {"flights", std::move(flights)}}));
+  response.header("Location", "/api/v1/sites/" + to_string(manifest.site));
+  return response;
+}
+
+/// A flight or a site: the file says which.
 Response take(BundleApi& s, const Request& request) {
   check_query(request, {});
   const std::string type = media_type(request);
-  if (type != k_bundle_type && type != "application/zip" && type != "application/octet-stream")
+  if (type != k_bundle_type && type != k_site_bundle_type && type != "application/zip" &&
+      type != "application/octet-stream")
     throw_problem(415, "media-type", std::string("send the bundle with Content-Type: ") + k_bundle_type);
   const auto folder = value_or_problem(SpoolFolder::make(s.spool));
   const auto file = folder->path("upload");
   if (spool_body(request, file) == 0) throw_problem(422, "validation", "the body is empty: send a bundle");
-  const ZipReader zip = value_or_refusal(ZipReader::open(file));
-  const BundleManifest manifest = value_or_refusal(checked_bundle(zip));
-  check_entries(s.bundles, manifest);
-  BundleZipSource source(zip);
-  const BundleOutcome outcome = value_or_refusal(s.bundles.take_in(manifest.mission, source));
-  s.audit(request, "bundle.import " + to_string(manifest.mission) + " sha256:" + bundle_digest(manifest),
-          outcome.added() ? "ok" : "already here");
-  if (outcome.added())
-    s.taken(manifest.mission,
-            to_utf8(manifest.mission_name, 200) + " was imported from a bundle, by " + request.principal.name,
-            std::ranges::any_of(outcome.tables, [](const auto& table) {
-              return table.name == "revision" && table.n_added > 0;
-            }));
-  Response response = json_response(outcome.added() ? 201 : 200, outcome_json(manifest, outcome));
-  response.header("Location", "/api/v1/missions/" + to_string(manifest.mission));
-  return response;
+  const ZipReader zip = value_or_refusal(ZipReader::open(file, {.entries = k_site_entries + 64}));
+  return is_site_bundle(zip) ? site_taken(s, request, zip, *folder) : flight_taken(s, request, zip);
 }
 
 }  // namespace
@@ -110,6 +116,8 @@ Response take(BundleApi& s, const Request& request) {
 void add_bundle_routes(Router& router, BundleApi& s) {
   router.add(as_heavy({Method::get, "/api/v1/missions/{id}/bundle", readers(),
                        [&s](const Request& request) { return bundle(s, request); }}));
+  router.add(as_heavy({Method::get, "/api/v1/sites/{id}/bundle", readers(),
+                       [&s](const Request& request) { return site_bundle(s, request); }}));
   router.add(as_heavy({Method::get, "/api/v1/missions/{id}/ranges.gpkg", readers(),
                        [&s](const Request& request) { return ranges_file(s, request); }}));
   router.add({Method::post, "/api/v1/bundles", Access::any_of({Role::engineer}),

@@ -15,15 +15,19 @@ class BundleStore;
 class CalibrationStore;
 class Clock;
 class Ed25519Key;
+class EventStore;
 class MeasurementStore;
+class MissionStore;
 class RevisionStore;
+class SiteStore;
 }  // namespace anchord
 
 namespace anchord::api {
 
 class Router;
 
-/// What is told of a flight beside its rows: for a person who opens the bundle, never imported.
+/// What is told of a flight beside its rows, for a person who opens the bundle. Of these its events are
+/// imported (bundle_notes.hpp).
 struct BundleNote {
   std::string name;  ///< "events.ndjson"
   std::string text;
@@ -33,6 +37,9 @@ struct BundleNote {
 /// What the routes of flight bundles work with; lives as long as the router.
 struct BundleApi {
   BundleStore& bundles;
+  EventStore& events;
+  MissionStore& missions;
+  SiteStore& sites;
   const Clock& clock;
   Audit audit;
   std::string made_by;
@@ -52,7 +59,8 @@ struct BundleApi {
   MakeFeatureFile feature_file;
 };
 
-/// GET /api/v1/missions/{id}/bundle, GET /api/v1/missions/{id}/ranges.gpkg and POST /api/v1/bundles.
+/// GET /api/v1/missions/{id}/bundle, GET /api/v1/sites/{id}/bundle, GET /api/v1/missions/{id}/ranges.gpkg
+/// and POST /api/v1/bundles.
 void add_bundle_routes(Router& router, BundleApi& api);
 /// GET /api/v1/missions/{id}/handover and GET /api/v1/signing-key.
 void add_handover_routes(Router& router, BundleApi& api);

@@ -5,21 +5,16 @@
 #include <cmath>
 #include <cstring>
 #include <nlohmann/json.hpp>
-#include <set>
 
 #include "api/kit/reader.hpp"
 #include "core/base/base64.hpp"
-#include "core/base/sha256.hpp"
 #include "core/base/text.hpp"
-#include "core/base/to_wire.hpp"
 
 namespace anchord::api {
 namespace {
 
 using nlohmann::json;
 
-constexpr std::string_view k_format = "anchord-bundle";
-constexpr std::uint64_t k_manifest_bytes = 1 << 20;
 constexpr std::size_t k_read_bytes = 64 * 1024;
 constexpr std::size_t k_uuid_bytes = 16;
 
@@ -88,102 +83,7 @@ std::optional<BundleCell> read_cell(const json& value, CellKind kind) {
   return std::nullopt;
 }
 
-/// A member of the manifest; empty or 0 where it is missing or of another kind, which no digest fits.
-std::string text_of(const json& object, const char* key) {
-  const auto at = object.is_object() ? object.find(key) : object.end();
-  return at != object.end() && at->is_string() ? at->get<std::string>() : std::string{};
-}
-std::uint64_t count_of(const json& object, const char* key) {
-  const auto at = object.is_object() ? object.find(key) : object.end();
-  return at != object.end() && at->is_number_unsigned() ? at->get<std::uint64_t>() : 0;
-}
-
 }  // namespace
-
-std::string bundle_digest(const BundleManifest& manifest) {
-  Sha256 sum;
-  sum.add(std::string(k_format) + ' ' + std::to_string(k_bundle_version) + ' ' + to_string(manifest.mission) +
-          '\n');
-  for (const auto& entry : manifest.entries) {
-    if (!entry.name.starts_with(k_bundle_notes)) sum.add(entry.sha256_hex + "  " + entry.name + '\n');
-  }
-  return sum.hex();
-}
-
-std::string write_bundle_manifest(const BundleManifest& manifest) {
-  nlohmann::ordered_json entries = nlohmann::ordered_json::array();
-  for (const auto& entry : manifest.entries)
-    entries.push_back(
-        {{"name", entry.name}, {"bytes", entry.bytes}, {"rows", entry.rows}, {"sha256", entry.sha256_hex}});
-  return to_wire(
-             nlohmann::ordered_json{
-                 {"format", k_format},
-                 {"version", k_bundle_version},
-                 {"mission", {{"id", to_string(manifest.mission)}, {"name", manifest.mission_name}}},
-                 {"made_at", to_rfc3339(manifest.made)},
-                 {"made_by", manifest.made_by},
-                 {"digest", "sha256:" + bundle_digest(manifest)},
-                 {"entries", std::move(entries)}},
-             1) +
-         '\n';
-}
-
-Result<BundleManifest> read_bundle_manifest(std::string_view text) {
-  json root;
-  if (const auto error = parse_json(text, root)) return refused("the manifest is not JSON: " + error->detail);
-  if (text_of(root, "format") != k_format) return refused("the manifest is not that of a flight bundle");
-  if (const auto version = count_of(root, "version"); version != k_bundle_version)
-    return make_error(Errc::unsupported, "the bundle is of version " + std::to_string(version) +
-                                             " of the format, this server reads " +
-                                             std::to_string(k_bundle_version));
-  BundleManifest out;
-  const auto mission = root.find("mission");
-  const auto id = parse_uuid(mission != root.end() ? text_of(*mission, "id") : std::string{});
-  if (!id) return refused("the manifest gives no mission");
-  out.mission = MissionId{id.value()};
-  out.mission_name = text_of(*mission, "name");
-  out.made_by = text_of(root, "made_by");
-  const auto entries = root.find("entries");
-  if (entries == root.end() || !entries->is_array()) return refused("the manifest has no entries");
-  for (const auto& entry : *entries)
-    out.entries.push_back({text_of(entry, "name"), count_of(entry, "bytes"), count_of(entry, "rows"),
-                           text_of(entry, "sha256")});
-  if (text_of(root, "digest") != "sha256:" + bundle_digest(out))
-    return refused("the manifest was changed: its digest does not match its entries");
-  return out;
-}
-
-Result<BundleManifest> checked_bundle(const ZipReader& zip) {
-  if (!zip.has(k_bundle_manifest))
-    return refused("this is not a valid flight bundle: it has no manifest.json");
-  BOOST_OUTCOME_TRY(const std::string text, zip.text(k_bundle_manifest, k_manifest_bytes));
-  BOOST_OUTCOME_TRY(auto manifest, read_bundle_manifest(text));
-  std::string wrong;
-  const auto add = [&](const std::string& what) { wrong += (wrong.empty() ? "" : "; ") + what; };
-  std::set<std::string> named{std::string(k_bundle_manifest)};
-  for (const auto& entry : manifest.entries) {
-    if (!named.insert(entry.name).second) add(to_utf8(entry.name, 80) + " is in the manifest twice");
-    const auto at = std::ranges::find(zip.entries(), entry.name, &ZipEntry::name);
-    if (at == zip.entries().end()) {
-      add(to_utf8(entry.name, 80) + " is missing");
-      continue;
-    }
-    if (at->bytes != entry.bytes) {
-      add(entry.name + " has " + std::to_string(at->bytes) + " bytes, not " + std::to_string(entry.bytes));
-      continue;
-    }
-    const auto sum = zip.sha256_hex(entry.name);
-    if (!sum)
-      add(sum.error().message);
-    else if (sum.value() != entry.sha256_hex)
-      add(entry.name + " does not have the digest of the manifest");
-  }
-  for (const auto& entry : zip.entries()) {
-    if (!named.contains(entry.name)) add(entry.name + " is not in the manifest");
-  }
-  if (!wrong.empty()) return refused("the bundle does not match its manifest: " + wrong);
-  return manifest;
-}
 
 std::string bundle_entry_name(const BundleTable& table) { return "tables/" + table.name + ".ndjson"; }
 

@@ -6,6 +6,7 @@
 #include <string_view>
 #include <vector>
 
+#include "api/formats/bundle_manifest.hpp"
 #include "api/formats/zip_archive.hpp"
 #include "core/base/ids.hpp"
 #include "core/base/result.hpp"
@@ -15,34 +16,6 @@
 /// The flight bundle (docs/formats.md): a zip file with a manifest, one file of lines for each table, and
 /// notes. A line is a JSON array; the first of a table names its columns.
 namespace anchord::api {
-
-inline constexpr std::string_view k_bundle_manifest = "manifest.json";
-inline constexpr std::string_view k_bundle_notes = "notes/";
-inline constexpr const char* k_bundle_type = "application/vnd.anchord.bundle+zip";
-inline constexpr int k_bundle_version = 1;
-
-struct BundleEntry {
-  std::string name;
-  std::uint64_t bytes{}, rows{};
-  std::string sha256_hex;
-};
-struct BundleManifest {
-  MissionId mission{};
-  std::string mission_name, made_by;
-  UtcTime made{};
-  std::vector<BundleEntry> entries;  ///< all but the manifest
-};
-
-/// SHA-256 over version, mission, and name and digest of every table: the same flight has the same, whenever
-/// and wherever it was written, whatever the notes tell.
-std::string bundle_digest(const BundleManifest& manifest);
-std::string write_bundle_manifest(const BundleManifest& manifest);
-/// errors: bad_frame (no manifest, or its own digest differs), unsupported (made by a newer format)
-Result<BundleManifest> read_bundle_manifest(std::string_view text);
-
-/// The manifest of a bundle that is just what it says: no entry more or less, every size and digest right.
-/// Reads all of it. errors: bad_frame, naming each entry that differs; unsupported
-Result<BundleManifest> checked_bundle(const ZipReader& zip);
 
 std::string bundle_entry_name(const BundleTable& table);
 /// Columns of the entry of a table whose first row is this (none: null): without those that came later and

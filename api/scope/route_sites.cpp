@@ -19,6 +19,7 @@ constexpr auto k_routes = std::to_array<RouteSites>({
     {get, "/api/v1/missions/{id}/bundle", refused},
     {get, "/api/v1/missions/{id}/ranges.gpkg", mission},
     {get, "/api/v1/missions/{id}/handover", refused},
+    {get, "/api/v1/sites/{id}/bundle", refused},
     {post, "/api/v1/bundles", refused},
     {get, "/api/v1/signing-key", open},
     {post, "/api/v1/missions/{id}/actions", mission},

@@ -61,6 +61,13 @@ class BundleStore {
   /// naming what is here with other content; invalid_argument where the rows are none of a bundle; those of
   /// the source, which may be read more than once.
   virtual Result<BundleOutcome> take_in(const MissionId& mission, BundleSource& source) = 0;
+
+  /// Kinds of rows of a site beside those of its flights: itself, frames, plans, anchors.
+  virtual const std::vector<BundleTable>& site_tables() const = 0;
+  /// errors: not_found, those of the sink
+  virtual Result<void> write_site(const SiteId& site, BundleSink& sink) = 0;
+  /// As take_in; every server edits these for itself, and what is here stays.
+  virtual Result<BundleOutcome> take_site(const SiteId& site, BundleSource& source) = 0;
 };
 
 }  // namespace anchord

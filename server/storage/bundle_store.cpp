@@ -29,6 +29,7 @@ constexpr const char* k_provenance =
     "SELECT c.settings_json, c.provenance_json FROM calibration c JOIN calibration_mission m ON "
     "m.calibration_key = c.calibration_key WHERE m.mission_key = ?1";
 constexpr const char* k_any_mission = "SELECT mission_key FROM mission WHERE id = ?1";
+constexpr const char* k_any_site = "SELECT 1 FROM site WHERE id = ?1";
 constexpr const char* k_insert_cir =
     "INSERT INTO cir (range_id, dt_ps, first_path_idx, preamble_count, re_im) VALUES (?1, ?2, ?3, ?4, ?5)";
 constexpr const char* k_revisions = "SELECT number FROM revision";
@@ -237,6 +238,17 @@ class Reader {
       counted.run();
     }
     return std::move(out_);
+  }
+
+  /// Of a site: every server edits these, so none depends on another being new.
+  Result<BundleOutcome> run_site(const SiteId& site) {
+    for (const auto& spec : site_bundle_specs()) {
+      BOOST_OUTCOME_TRY(take(spec));
+    }
+    Query found(c_, k_any_site);
+    found << site;
+    if (found.step()) return std::move(out_);
+    return make_error(Errc::invalid_argument, "the bundle has no row of its site " + to_string(site));
   }
 
  private:
@@ -487,6 +499,7 @@ class SqlBundleStore final : public BundleStore {
  public:
   explicit SqlBundleStore(Gate& gate) : gate_(gate) {
     for (const auto& spec : bundle_specs()) tables_.push_back(spec.table);
+    for (const auto& spec : site_bundle_specs()) site_tables_.push_back(spec.table);
   }
 
   const std::vector<BundleTable>& tables() const override { return tables_; }
@@ -512,9 +525,34 @@ class SqlBundleStore final : public BundleStore {
     });
   }
 
+  const std::vector<BundleTable>& site_tables() const override { return site_tables_; }
+
+  Result<void> write_site(const SiteId& site, BundleSink& sink) override {
+    const auto error = gate_.read([&](Connection& c) -> std::optional<Error> {
+      if (auto missing = missing_site(c, site)) return missing;
+      for (const auto& spec : site_bundle_specs()) {
+        if (auto begun = sink.begin(spec.table); !begun) return begun.error();
+        Query query(c, spec.select);
+        query << site;
+        while (query.step()) {
+          if (auto written = sink.row(read_row(query, spec.table)); !written) return written.error();
+        }
+      }
+      return std::nullopt;
+    });
+    if (error) return *error;
+    return boost::outcome_v2::success();
+  }
+
+  Result<BundleOutcome> take_site(const SiteId& site, BundleSource& source) override {
+    return write_value<BundleOutcome>(gate_, k_weight, [&](Connection& c) -> Result<BundleOutcome> {
+      return Reader(c, {}, source).run_site(site);
+    });
+  }
+
  private:
   Gate& gate_;
-  std::vector<BundleTable> tables_;
+  std::vector<BundleTable> tables_, site_tables_;
 };
 
 }  // namespace

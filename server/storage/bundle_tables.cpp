@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <span>
 
 #include "core/base/check.hpp"
 
@@ -32,24 +33,25 @@ constexpr const char* k_of_revisions =
 constexpr const char* k_of_anchors =
     "t.network_id IN (SELECT d.network_id FROM device_seen d WHERE d.mission_key = ?1 AND d.kind = 1)";
 
+constexpr const char* k_site_columns =
+    "u id t name r origin_lat_deg r origin_lon_deg r origin_height_m t outline_geojson t crs_frame "
+    "r crs_epoch_year r base_sigma_m t base_source i created_t_ns i version i projected_epsg";
+constexpr const char* k_frame_columns = "u id t name u site_id t definition_json i created_t_ns i version";
+constexpr const char* k_plan_columns =
+    "u id t name u site_id t document_json i created_t_ns i changed_t_ns i version";
+constexpr const char* k_anchor_columns =
+    "u id i network_id u site_id t name t building t floor t space t asset_tag t ifc_guid i retired "
+    "i created_t_ns i version";
+constexpr const char* k_external_id_columns = "u anchor_id i ordinal t system t external_id";
+
 constexpr std::array k_lines{
-    Line{BundlePart::site, "site",
-         "u id t name r origin_lat_deg r origin_lon_deg r origin_height_m t outline_geojson t crs_frame "
-         "r crs_epoch_year r base_sigma_m t base_source i created_t_ns i version i projected_epsg",
-         "id", "t.id = ?1", "t.id"},
-    Line{BundlePart::site, "local_frame", "u id t name u site_id t definition_json i created_t_ns i version",
-         "id", "t.site_id = ?1", "t.id"},
+    Line{BundlePart::site, "site", k_site_columns, "id", "t.id = ?1", "t.id"},
+    Line{BundlePart::site, "local_frame", k_frame_columns, "id", "t.site_id = ?1", "t.id"},
     Line{BundlePart::shared, "kit_profile", "t kit i version i t_ns t changed_by t source t profile_json",
          "kit version", "t.kit = (SELECT m.kit FROM mission m WHERE m.mission_key = ?1)", "t.version"},
-    Line{BundlePart::plan, "plan",
-         "u id t name u site_id t document_json i created_t_ns i changed_t_ns i version", "id", "t.id = ?1",
-         "t.id"},
-    Line{BundlePart::shared, "anchor",
-         "u id i network_id u site_id t name t building t floor t space t asset_tag t ifc_guid i retired "
-         "i created_t_ns i version",
-         "network_id", k_of_anchors, "t.network_id"},
-    Line{BundlePart::shared, "anchor_external_id", "u anchor_id i ordinal t system t external_id",
-         "anchor_id ordinal",
+    Line{BundlePart::plan, "plan", k_plan_columns, "id", "t.id = ?1", "t.id"},
+    Line{BundlePart::shared, "anchor", k_anchor_columns, "network_id", k_of_anchors, "t.network_id"},
+    Line{BundlePart::shared, "anchor_external_id", k_external_id_columns, "anchor_id ordinal",
          "t.anchor_id IN (SELECT a.id FROM anchor a JOIN device_seen d ON d.network_id = a.network_id WHERE "
          "d.mission_key = ?1 AND d.kind = 1)",
          "t.anchor_id, t.ordinal"},
@@ -120,6 +122,16 @@ constexpr std::array k_lines{
          "number network_id", k_of_revisions, "t.number, t.network_id"},
     Line{BundlePart::revision, "revision_override", "i number i network_id t reason t overridden_by",
          "number network_id", k_of_revisions, "t.number, t.network_id"},
+};
+
+/// Of a site, beside its flights: ?1 is the site.
+constexpr std::array k_site_lines{
+    Line{BundlePart::site, "site", k_site_columns, "id", "t.id = ?1", "t.id"},
+    Line{BundlePart::site, "local_frame", k_frame_columns, "id", "t.site_id = ?1", "t.id"},
+    Line{BundlePart::plan, "plan", k_plan_columns, "id", "t.site_id = ?1", "t.id"},
+    Line{BundlePart::shared, "anchor", k_anchor_columns, "network_id", "t.site_id = ?1", "t.network_id"},
+    Line{BundlePart::shared, "anchor_external_id", k_external_id_columns, "anchor_id ordinal",
+         "t.anchor_id IN (SELECT a.id FROM anchor a WHERE a.site_id = ?1)", "t.anchor_id, t.ordinal"},
 };
 
 std::vector<std::string> words(std::string_view text) {
@@ -231,14 +243,21 @@ BundleSpec spec_of(const Line& line) {
   return spec;
 }
 
+std::vector<BundleSpec> specs_of(std::span<const Line> lines) {
+  std::vector<BundleSpec> all;
+  for (const Line& line : lines) all.push_back(spec_of(line));
+  return all;
+}
+
 }  // namespace
 
 const std::vector<BundleSpec>& bundle_specs() {
-  static const std::vector<BundleSpec> specs = [] {
-    std::vector<BundleSpec> all;
-    for (const Line& line : k_lines) all.push_back(spec_of(line));
-    return all;
-  }();
+  static const std::vector<BundleSpec> specs = specs_of(k_lines);
+  return specs;
+}
+
+const std::vector<BundleSpec>& site_bundle_specs() {
+  static const std::vector<BundleSpec> specs = specs_of(k_site_lines);
   return specs;
 }
 

@@ -51,5 +51,7 @@ struct BundleSpec {
 
 /// In the order in which rows are written and taken: what is named stands before what names it.
 const std::vector<BundleSpec>& bundle_specs();
+/// The same of a site, without its flights.
+const std::vector<BundleSpec>& site_bundle_specs();
 
 }  // namespace anchord::sql
