@@ -82,15 +82,13 @@ test('a calibration, published', async () => {
 });
 
 test('a flight as one file, and back', async () => {
-  const bundle = await server.fetch(`/api/v1/missions/${ids.mission}/bundle`);
-  const body = Buffer.from(await bundle.arrayBuffer());
+  const body = Buffer.from(await (await server.fetch(`/api/v1/missions/${ids.mission}/bundle`)).arrayBuffer());
   const headers = { 'content-type': 'application/vnd.anchord.bundle+zip' };
   const back = await call('POST', '/api/v1/bundles', { expect: 200, headers, body });
   assert.equal(back.json.already, true, back.text);
   assert.ok(back.json.rows.uwb_range > 0, back.text);
-  const whole = Buffer.from(await (await server.fetch(`/api/v1/sites/${ids.site}/bundle`)).arrayBuffer());
-  const site_back = await call('POST', '/api/v1/bundles', { expect: 200, headers, body: whole });
-  assert.equal(site_back.json.already, true);
+  const site = await (await server.fetch(`/api/v1/sites/${ids.site}/bundle`)).arrayBuffer();
+  await call('POST', '/api/v1/bundles', { expect: 200, headers, body: Buffer.from(site) });
   await call('POST', '/api/v1/bundles', { expect: 422, headers, body: body.subarray(0, 500) });
   await call('POST', '/api/v1/bundles', { expect: 415, json: {} });
   await call('GET', `/api/v1/missions/${ids.spare}/bundle`, { expect: 409 }); // it records
