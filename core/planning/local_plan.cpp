@@ -143,11 +143,15 @@ Result<Wgs84> plan_origin(const Plan& plan) {
     return make_error(Errc::invalid_argument,
                       "the plan has no origin, no outline and no waypoint: nowhere to fly");
   }
+  // Longitudes count from the first one, the short way round: the middle of a plan over the date line is
+  // there, and not at Greenwich.
+  const double first_deg = points.front().lon_deg;
   Wgs84 middle{};
   for (const auto& p : points) {
-    middle.lon_deg += p.lon_deg / static_cast<double>(points.size());
+    middle.lon_deg += std::remainder(p.lon_deg - first_deg, 360) / static_cast<double>(points.size());
     middle.lat_deg += p.lat_deg / static_cast<double>(points.size());
   }
+  middle.lon_deg = std::remainder(first_deg + middle.lon_deg, 360);
   return middle;
 }
 

@@ -58,7 +58,8 @@ Eigen::Vector3d AutopilotSim::metres(double lat_deg, double lon_deg) const {
   for (int i = 0; i < 3; ++i) {
     const Wgs84 at = place(enu);
     enu.y() += (lat_deg - at.lat_deg) * k_metres_per_degree;
-    enu.x() += (lon_deg - at.lon_deg) * k_metres_per_degree * std::cos(lat_deg * std::numbers::pi / 180);
+    enu.x() += std::remainder(lon_deg - at.lon_deg, 360) * k_metres_per_degree *
+               std::cos(lat_deg * std::numbers::pi / 180);
   }
   return enu;
 }

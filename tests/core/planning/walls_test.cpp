@@ -262,5 +262,16 @@ TEST(GenerateWaypoints, KeepsOutOfAnAcceptedBuildingThatIsLargerThanTheDrawnOne)
   EXPECT_TRUE(check_plan(made).value().flyable());
 }
 
+TEST(PlanOrigin, IsInTheMiddleOfAPlanOverTheDateLine) {
+  Plan plan;
+  plan.outline = {{179.9999, -17}, {-179.9999, -17}, {-179.9999, -16.9998}, {179.9999, -16.9998}};
+  const auto origin = plan_origin(plan).value();
+  EXPECT_NEAR(std::abs(origin.lon_deg), 180, 1e-9);
+  EXPECT_NEAR(origin.lat_deg, -16.9999, 1e-9);
+  // 0.0001 degrees of longitude there: 10.65 m (a = 6378137 m, f = 1/298.257223563).
+  const auto local = local_plan(plan).value();
+  for (const auto& corner : local.outline) EXPECT_NEAR(std::abs(corner.x()), 10.65, 0.01);
+}
+
 }  // namespace
 }  // namespace anchord::planning
