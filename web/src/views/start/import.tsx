@@ -1,6 +1,7 @@
 /// Import a flight: a folder, tables or an archive is dropped; columns whose names say nothing are given by a person; the flight opens.
 import { useEffect, useRef, useState } from 'preact/hooks';
 import './start.css';
+import { Bundle } from './bundle';
 import { guessed_ranges, guessed_track, missing_ranges, missing_track } from './fields';
 import { declared_of } from './flight_files';
 import { Mapping, type Found } from './mapping';
@@ -65,6 +66,7 @@ async function dropped(list: DataTransferItemList): Promise<File[]> {
 
 export function Import() {
   const [found, set_found] = useState<Found | null>(null),
+    [bundle, set_bundle] = useState<File | null>(null),
     [problem, set_problem] = useState(''),
     [over, set_over] = useState(false),
     files = useRef<HTMLInputElement>(null),
@@ -76,6 +78,11 @@ export function Import() {
   const take = (list: readonly File[]): void => {
     if (!list.length) return;
     set_problem('');
+    const whole = list.find((f) => /\.anchord$/i.test(f.name));
+    if (whole) {
+      set_bundle(whole);
+      return;
+    }
     found_in(list).then(set_found, (e: unknown) => set_problem(e instanceof Error ? e.message : String(e)));
   };
   const picked = (e: Event): void => {
@@ -89,9 +96,10 @@ export function Import() {
         <h1>Import a flight</h1>
         <p class="lead">
           A flight folder (flight.json, track.csv, ranges.csv), only the two tables as a logger wrote them, or either as
-          .zip. The track may be a .pos file of RTKLIB, and its positions of a map. Nothing leaves this server.
+          .zip. The track may be a .pos file of RTKLIB, and its positions of a map. Or a flight or site of another
+          anchord server (.anchord). Nothing leaves this server.
         </p>
-        {!found && (
+        {!found && !bundle && (
           <div
             class={over ? 'dropzone over' : 'dropzone'}
             data-testid="dropzone"
@@ -117,7 +125,7 @@ export function Import() {
               ref={files}
               type="file"
               multiple
-              accept=".csv,.tsv,.txt,.pos,.llh,.json,.zip,.gz"
+              accept=".csv,.tsv,.txt,.pos,.llh,.json,.zip,.gz,.anchord"
               hidden
               aria-label="Flight files"
               onChange={picked}
@@ -130,6 +138,7 @@ export function Import() {
             <b>This is not a flight.</b> {problem}
           </div>
         )}
+        {bundle && <Bundle file={bundle} back={() => set_bundle(null)} />}
         {found && <Mapping found={found} back={() => set_found(null)} />}
       </div>
     </div>

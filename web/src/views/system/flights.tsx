@@ -1,5 +1,6 @@
 /// Stored flights: which there are, handing one over, deleting one, and getting it back.
 import { useEffect, useState } from 'preact/hooks';
+import { flight_bundle_url } from '../../api/bundles';
 import { error_text } from '../../api/client';
 import {
   delete_flight,
@@ -109,6 +110,18 @@ export function FlightsPanel() {
                     data-testid="handover-flight"
                   >
                     Download
+                  </a>
+                )}
+                {of_every_site.value && f.state !== 'recording' && (
+                  <a
+                    class="btn small"
+                    href={flight_bundle_url(f.id)}
+                    download
+                    aria-label={`Download ${f.name || f.id.slice(0, 8)} for another anchord server`}
+                    title="All that is stored of it, for another anchord server (Import)"
+                    data-testid="bundle-flight"
+                  >
+                    Bundle
                   </a>
                 )}
               </td>
