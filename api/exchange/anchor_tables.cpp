@@ -5,6 +5,7 @@
 #include <set>
 
 #include "api/exchange/flight_track.hpp"
+#include "api/kit/date_line.hpp"
 #include "api/kit/problem.hpp"
 #include "core/geo/enu.hpp"
 #include "core/localize/error_ellipse.hpp"
@@ -17,11 +18,9 @@ using Type = FeatureTable::Type;
 using Value = FeatureTable::Value;
 
 Eigen::Vector3d vertex(const Wgs84& at) { return {at.lon_deg, at.lat_deg, at.height_m}; }
-/// A line or ring over the date line goes on beyond 180 degrees: from 180 to -180 it would go round the
-/// globe.
 void keep_together(std::vector<Eigen::Vector3d>& vertices) {
   for (std::size_t i = 1; i < vertices.size(); ++i)
-    vertices[i].x() += 360.0 * std::round((vertices[i - 1].x() - vertices[i].x()) / 360.0);
+    vertices[i].x() = beside(vertices[i].x(), vertices[i - 1].x());
 }
 Value text(const std::string& value) { return value.empty() ? Value{} : Value{value}; }
 template <class T>

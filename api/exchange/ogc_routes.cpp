@@ -9,6 +9,7 @@
 #include "api/exchange/ogc_query.hpp"
 #include "api/exchange/ogc_zones.hpp"
 #include "api/exchange/routes.hpp"
+#include "api/kit/date_line.hpp"
 #include "api/kit/or_null.hpp"
 #include "api/kit/support.hpp"
 #include "core/ports/anchor_store.hpp"
@@ -111,8 +112,11 @@ std::vector<Item> items_of(ExchangeApi& s, const OgcCollection& collection) {
 
 Ordered track_json(const Mission& mission, const FlightTrack& track) {
   Ordered line = Ordered::array();
-  for (const auto& vertex : track.vertices)
-    line.push_back({vertex.at.lon_deg, vertex.at.lat_deg, vertex.at.height_m});
+  std::optional<double> before_deg;
+  for (const auto& vertex : track.vertices) {
+    before_deg = beside(vertex.at.lon_deg, before_deg.value_or(vertex.at.lon_deg));
+    line.push_back({*before_deg, vertex.at.lat_deg, vertex.at.height_m});
+  }
   Ordered out{{"type", "Feature"}, {"id", to_string(mission.id)}};
   out["geometry"] =
       line.size() > 1 ? Ordered{{"type", "LineString"}, {"coordinates", std::move(line)}} : Ordered(nullptr);

@@ -5,7 +5,8 @@
 
 namespace anchord::api {
 
-/// One CSV cell: quoted where needed; a text that begins like a formula gets a leading apostrophe.
+/// One CSV cell: quoted where needed; a text that begins like a formula and is no number gets a leading
+/// apostrophe.
 std::string csv_text(std::string_view text);
 
 }  // namespace anchord::api

@@ -217,7 +217,9 @@ std::string negotiate(const Request& request, std::initializer_list<std::string_
   };
   if (const auto format = request.query_value("format")) {
     if (!offered(*format))
-      throw_problem(406, "not-acceptable", "this address does not support the format " + *format);
+      throw_problem(406, "not-acceptable",
+                    "this address does not support the format " + *format + "; it has " +
+                        list_of({offers.begin(), offers.end()}));
     return *format;
   }
   const std::string accept(request.header("accept"));
@@ -234,7 +236,9 @@ std::string negotiate(const Request& request, std::initializer_list<std::string_
   if (accept.find("application/json") != std::string::npos ||
       accept.find("application/*") != std::string::npos)
     return std::string(*offers.begin());
-  throw_problem(406, "not-acceptable", "none of the formats in Accept is available here");
+  throw_problem(406, "not-acceptable",
+                "none of the formats in Accept is available here; ?format= takes " +
+                    list_of({offers.begin(), offers.end()}));
 }
 
 int prefer_wait_s(const Request& request) {

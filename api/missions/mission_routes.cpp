@@ -5,6 +5,7 @@
 #include "api/devices/device_stream.hpp"
 #include "api/kit/content_tag.hpp"
 #include "api/kit/current_sites.hpp"
+#include "api/kit/date_line.hpp"
 #include "api/kit/id_page.hpp"
 #include "api/kit/reader.hpp"
 #include "api/kit/row_cursor.hpp"
@@ -232,11 +233,14 @@ Response track(MissionApi& s, const Request& request) {
   check_row_cursor(s.measurements, filter);
   const auto rows = value_or_problem(s.measurements.fixes(filter));
   Ordered line = Ordered::array(), local = Ordered::array(), t_us = Ordered::array(), fix = Ordered::array();
+  std::optional<double> before_deg;
   for (const auto& row : rows.rows) {
-    if (row.frame == TrackFrame::wgs84)
-      line.push_back({row.position.lon_deg, row.position.lat_deg, row.position.height_m});
-    else
+    if (row.frame == TrackFrame::wgs84) {
+      before_deg = beside(row.position.lon_deg, before_deg.value_or(row.position.lon_deg));
+      line.push_back({*before_deg, row.position.lat_deg, row.position.height_m});
+    } else {
       local.push_back({row.local_m.x(), row.local_m.y(), row.local_m.z()});
+    }
     t_us.push_back(row.time.us());
     fix.push_back(k_fix_words.word(row.fix));
   }

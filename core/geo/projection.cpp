@@ -2,6 +2,7 @@
 
 #include <proj.h>
 
+#include <algorithm>
 #include <array>
 #include <cctype>
 #include <cmath>
@@ -49,11 +50,34 @@ struct Owned {
 
 std::string code(int epsg) { return "EPSG:" + std::to_string(epsg); }
 
+/// What keeps numbers of a map system from being metres east and north; empty where they are. Both axes of a
+/// polar system point north, or both south.
+std::string not_metres_east_north(PJ_CONTEXT* context, const PJ* crs, const std::string& name) {
+  const Owned axes{proj_crs_get_coordinate_system(context, crs)};
+  std::array<std::string, 2> directions;
+  for (int i = 0; i < 2; ++i) {
+    const char *direction = nullptr, *unit = nullptr;
+    double metres = 1;
+    if (axes.pj == nullptr || proj_cs_get_axis_info(context, axes.pj, i, nullptr, nullptr, &direction,
+                                                    &metres, &unit, nullptr, nullptr) == 0)
+      return name + ": its axes are not supported";
+    if (metres != 1) return name + " counts in " + unit + ": name a system that counts in metres";
+    directions[static_cast<std::size_t>(i)] = direction;
+  }
+  std::ranges::sort(directions);
+  if (directions == std::array<std::string, 2>{"east", "north"} ||
+      (directions[0] == directions[1] && directions[0] != "west"))
+    return {};
+  return name + " counts " + directions[0] + " and " + directions[1] +
+         ": name a system that counts east and north";
+}
+
 }  // namespace
 
 /// A PJ belongs to one thread at a time.
 struct Projection::Pipeline {
   Locked<Transformation> transformation;
+  std::string unusable;  ///< why no easting and northing in metres comes of it
 };
 
 std::optional<int> geographic_epsg(std::string_view datum) {
@@ -101,10 +125,12 @@ Result<Projection> Projection::open(int epsg, int geographic_epsg) {
   // Longitude and easting first, in whatever order the register has the axes.
   made->operation = proj_normalize_for_visualization(context, found.pj);
   if (made->operation == nullptr) return make_error(Errc::unsupported, name + ": its axes are not supported");
+  pipeline->unusable = not_metres_east_north(context, target.pj, name);
   return Projection(epsg, std::move(name), std::move(pipeline));
 }
 
 Result<Eigen::Vector2d> Projection::easting_northing_m(const Wgs84& at) const {
+  if (!pipeline_->unusable.empty()) return make_error(Errc::unsupported, pipeline_->unusable);
   const auto use = pipeline_->transformation.lock();
   const PJ_COORD out =
       proj_trans(use->operation, PJ_FWD, proj_coord(at.lon_deg, at.lat_deg, at.height_m, HUGE_VAL));

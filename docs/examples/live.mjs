@@ -1,4 +1,4 @@
-// node live.mjs http://127.0.0.1:8420 TOKEN system: prints what a topic says, one JSON a line. A page does the same: a ticket instead of a header.
+// node live.mjs http://127.0.0.1:8420 TOKEN system: prints what a topic says, one JSON a line. Node 22 or newer; Node 20: node --experimental-websocket. A page does the same: a ticket instead of a header.
 const [url, token, topic] = process.argv.slice(2);
 const headers = { authorization: `Bearer ${token}` };
 const { ticket } = await (await fetch(`${url}/api/v1/ws-tickets`, { method: 'POST', headers })).json();

@@ -138,6 +138,23 @@ TEST_F(Ogc, ATrackKeepsThePathAndNotTheHovering) {
   EXPECT_EQ(get("/ogc/collections/tracks/items/" + id).status, 200);
 }
 
+// From 179.9999 to -179.9999 a map would draw the path round the globe.
+TEST_F(Ogc, ATrackOverTheDateLineStaysTogether) {
+  const auto id = mission();
+  std::string rows;
+  for (int i = 0; i < 4; ++i)
+    rows += R"({"t_us":)" + std::to_string(1777889472000000LL + i * 1000000LL) + R"(,"lon":)" +
+            (i % 2 == 0 ? "179.9999" : "-179.9999") + R"(,"lat":-16.8,"h_m":60.5,"fix":"fixed"})" + "\n";
+  ASSERT_EQ(post("/api/v1/fixes", rows, "application/x-ndjson", {{"mission", id}}).status, 200);
+  for (const Json& line : {items("tracks")["features"][0]["geometry"]["coordinates"],
+                           json(get("/api/v1/missions/" + id + "/track"))["geometry"]["coordinates"]}) {
+    ASSERT_EQ(line.size(), 4U) << line;
+    for (std::size_t i = 0; i < line.size(); ++i)
+      EXPECT_NEAR(line[i][0].get<double>(), i % 2 == 0 ? 179.9999 : 180.0001, 1e-9) << line;
+  }
+  EXPECT_EQ(items("tracks", {{"bbox", "179,-17,-179,-16"}})["numberReturned"], 1);
+}
+
 TEST_F(Ogc, AFlightWithoutAPlaceOnTheGlobeHasNoGeometry) {
   mission("local");
   mission();  // without a position

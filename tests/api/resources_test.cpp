@@ -224,8 +224,13 @@ TEST_F(Resources, PatchFacilityDataAndExportItSafely) {
   const auto csv = get("/api/v1/exports/anchors.csv").body;
   EXPECT_NE(csv.find(",'=1+1,"), std::string::npos) << csv;
   EXPECT_NE(csv.find(R"("B""1""")"), std::string::npos) << csv;
+  const auto below = call(Method::patch, "/api/v1/anchors/0x6a2f", R"({"floor":"-2","space":"-2+3"})",
+                          with("if-match", header(patched, "ETag")));
+  ASSERT_EQ(below.status, 200) << below.body;
+  const auto cells = get("/api/v1/exports/anchors.csv").body;
+  EXPECT_NE(cells.find(",-2,'-2+3,"), std::string::npos) << "a floor below ground is a number: " << cells;
   EXPECT_EQ(
-      call(Method::patch, "/api/v1/anchors/0x6a2f", R"({"h_m":3})", with("if-match", header(patched, "ETag")))
+      call(Method::patch, "/api/v1/anchors/0x6a2f", R"({"h_m":3})", with("if-match", header(below, "ETag")))
           .status,
       422);
   EXPECT_EQ(get("/api/v1/anchors/0x9999").status, 404);

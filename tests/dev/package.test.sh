@@ -60,6 +60,10 @@ for profile in field mqtt https; do
   attempt docker-compose -f docker-compose.yml --profile "$profile" config --quiet
   expect "docker-compose.yml with profile $profile" 0 ''
 done
+# Without these Caddy's requests are refused, for the server knows nobody of that name.
+attempt env ANCHORD_ALLOWED_HOSTS=anchord.example ANCHORD_TRUSTED_PROXIES=172.16.0.0/12 docker-compose -f docker-compose.yml --profile https config
+expect "the name of the server in a container" 0 'ANCHORD_ALLOWED_HOSTS: anchord.example'
+expect "the proxy of the server in a container" 0 'ANCHORD_TRUSTED_PROXIES: 172.16.0.0/12'
 
 # --- SBOM: each library that is needed, each npm package of the page; a licence text for what is inside.
 read_sbom() { python3 -c '

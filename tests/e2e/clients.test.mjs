@@ -112,6 +112,17 @@ async function first_line(program, args) {
   }
 }
 
+/** Runs a program with the names of arguments that websockets 14 and newer have; Debian 12 has 10.4. */
+const since_websockets_14 = `
+import runpy, sys, websockets
+real = websockets.connect
+def connect(uri, *, subprotocols=None, additional_headers=None):
+    return real(uri, subprotocols=subprotocols, extra_headers=additional_headers)
+websockets.connect = connect
+del sys.argv[0]
+runpy.run_path(sys.argv[0], run_name="__main__")
+`;
+
 test('the live interface in ten lines of Python, of JavaScript, and by wscat', async () => {
   const example = (name) => join(root, 'docs/examples', name),
     live = server.url.replace('http', 'ws');
@@ -124,6 +135,15 @@ test('the live interface in ten lines of Python, of JavaScript, and by wscat', a
     );
   const python = await first_line('/usr/bin/python3', [example('live.py'), live, server.token, 'system']);
   assert.ok(python.db_bytes > 0, JSON.stringify(python));
+  const newer = await first_line('/usr/bin/python3', [
+    '-c',
+    since_websockets_14,
+    example('live.py'),
+    live,
+    server.token,
+    'system',
+  ]);
+  assert.ok(newer.db_bytes > 0, JSON.stringify(newer));
   // Node 20 has its WebSocket behind a flag.
   const script = await first_line(process.execPath, [
     '--experimental-websocket',

@@ -1,7 +1,7 @@
 // The samples of docs/examples before a real server: nginx and Caddy of Debian, with their addresses, ports and certificate replaced.
 import assert from 'node:assert/strict';
 import { execFile, spawn } from 'node:child_process';
-import { mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
+import { mkdtempSync, readFileSync, rmSync, truncateSync, writeFileSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { after, before, test } from 'node:test';
@@ -108,6 +108,19 @@ async function everything(url, curl, port) {
     url + plan,
   );
   assert.match(sent.stdout, /not a PNG, JPEG[^]*\n415$/, '40 MB came to the server, which looked at them');
+
+  // Sparse: a flight bundle is the largest body, and this is none.
+  writeFileSync(at('bundle'), '');
+  truncateSync(at('bundle'), 70 << 20);
+  const bundle = await curl(
+    ...bearer,
+    '-H',
+    'Content-Type: application/vnd.anchord.bundle+zip',
+    '--data-binary',
+    `@${at('bundle')}`,
+    url + '/api/v1/bundles',
+  );
+  assert.match(bundle.stdout, /Nothing was imported/, '70 MB came to the server, which looked at them');
 
   const socket = new WebSocket(`wss://anchord.example:${port}/api/v1/ws`, 'anchord.v1', {
     ca: readFileSync(at('ca.pem')),

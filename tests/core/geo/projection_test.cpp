@@ -64,6 +64,37 @@ TEST(Projection, RefusesWhatIsNoMap) {
   EXPECT_FALSE(utm.value().easting_northing_m({91, 0, 0}).has_value());
 }
 
+// Eastings in feet, or counted west, would be taken for metres east by every drawing and table made of them.
+TEST(Projection, GivesMetresEastAndNorthOrSaysWhyNot) {
+  struct Case {
+    int epsg;
+    Wgs84 at;
+    const char* says;
+  };
+  for (const auto& [epsg, at, says] :
+       {Case{2225, {40.5, -122.3, 0}, "counts in US survey foot"},
+        Case{2048, {-33.9, 18.4, 0}, "south and west"}, Case{5513, {50.08, 14.42, 0}, "south and west"}}) {
+    const auto map = Projection::open(epsg, 4979);
+    ASSERT_TRUE(map.has_value()) << epsg << map.error().message;
+    const auto got = map.value().easting_northing_m(at);
+    ASSERT_FALSE(got.has_value()) << epsg << ": " << got.value().transpose();
+    EXPECT_NE(got.error().message.find(says), std::string::npos) << got.error().message;
+    EXPECT_TRUE(map.value().geographic({1000, 1000}, 0).has_value()) << "pictures come with its own numbers";
+  }
+  // gdaltransform -s_srs EPSG:4979 -t_srs EPSG:... -output_xy
+  for (const auto& [epsg, at, e_m, n_m] :
+       {std::tuple{3031, Wgs84{-77.85, 166.67, 0}, 305467.1627, -1289201.5377},
+        {5041, {89.9995, 20, 0}, 2000018.9862, 1999947.8359},
+        {2193, {-41.3, 174.8, 0}, 1750697.5213, 5426376.6232}}) {
+    const auto map = Projection::open(epsg, epsg == 2193 ? 4959 : 4979);
+    ASSERT_TRUE(map.has_value()) << epsg << map.error().message;
+    const auto got = map.value().easting_northing_m(at);
+    ASSERT_TRUE(got.has_value()) << epsg << got.error().message;
+    EXPECT_NEAR(got.value().x(), e_m, 0.01) << epsg;
+    EXPECT_NEAR(got.value().y(), n_m, 0.01) << epsg;
+  }
+}
+
 TEST(Projection, KnowsDatumsByTheirWordsAndNothingByGuess) {
   EXPECT_EQ(geographic_epsg("ETRS89"), 4937);
   EXPECT_EQ(geographic_epsg("WGS 84"), 4979);
