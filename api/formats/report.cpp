@@ -17,14 +17,14 @@ constexpr const char* k_style = R"css(
 :root{--ink:#000;--ink2:#434b55;--ink3:#5a6068;--line:#d6dbe1;--edge:#7e8791;--ok:#0b6b2e;--caution:#8a4b00;--bad:#b00020;--info:#0b57a4;--okw:#e4f2e8;--inset:#eef1f4}
 *{box-sizing:border-box}
 html{background:#e9edf0}
-body{margin:0;font:11px/1.45 system-ui,-apple-system,"Segoe UI",Roboto,"Noto Sans",Cantarell,"Liberation Sans",sans-serif;color:var(--ink);font-variant-numeric:tabular-nums;-webkit-print-color-adjust:exact;print-color-adjust:exact}
+body{margin:0;overflow-wrap:anywhere;font:11px/1.45 system-ui,-apple-system,"Segoe UI",Roboto,"Noto Sans",Cantarell,"Liberation Sans",sans-serif;color:var(--ink);font-variant-numeric:tabular-nums;-webkit-print-color-adjust:exact;print-color-adjust:exact}
 .sheet{width:210mm;min-height:296mm;margin:8mm auto;padding:14mm 15mm 12mm;background:#fff;display:flex;flex-direction:column}
 @media print{html{background:#fff}.sheet{width:auto;min-height:270mm;margin:0;padding:0}.sheet+.sheet{break-before:page}}
 .top{display:flex;align-items:flex-end;justify-content:space-between;border-bottom:2px solid #000;padding-bottom:9px}
 h1{font-size:24px;line-height:1.1;letter-spacing:-.02em;margin:0}.top p{margin:4px 0 0;font-size:12.5px;color:var(--ink2)}
 .top .rev{text-align:right}.top b{font-size:22px;font-weight:500;line-height:1.1}
 .meta{display:grid;grid-template-columns:repeat(4,1fr);gap:7px 18px;padding:10px 0 12px}
-.lab{display:block;font-size:10.5px;color:var(--ink3)}.meta .v{font-size:12.5px;font-weight:500;overflow-wrap:anywhere}
+.lab{display:block;font-size:10.5px;color:var(--ink3)}.meta .v{font-size:12.5px;font-weight:500}
 .fig{display:grid;grid-template-columns:minmax(0,1fr) 172px;gap:16px}
 .map{display:block;width:100%;border:1px solid var(--edge);background:#fff}
 .acc{display:flex;flex-direction:column;gap:9px}.acc>div{border-top:1px solid var(--edge);padding-top:6px}

@@ -85,7 +85,7 @@ test('columns are chosen and stay, degrees may have minutes, and one anchor is l
   await id('column-lat').check();
   await id('dms').check();
   await page.keyboard.press('Escape');
-  assert.equal(await id('column-list').count(), 0);
+  assert.equal(await id('columns-list').count(), 0);
   await page.reload();
   await id('row-0x6a21').waitFor();
   assert.doesNotMatch(await heads(), /GDOP/);

@@ -217,7 +217,7 @@ test('Escape closes every dialog and the focus goes back; the view is reached wi
   await opensByKeys(page, page.getByRole('button', { name: 'Help' }), id('help'));
   await opensByKeys(page, id('open-checklist'), id('checklist'));
   await id('nav-anchors').click();
-  await opensByKeys(page, id('columns'), id('column-list'));
+  await opensByKeys(page, id('columns'), id('columns-list'));
   await opensByKeys(page, id('compare'), page.getByRole('dialog'));
   await opensByKeys(page, id('review'), id('publish'));
   // Of two that are open Escape closes the newer one.

@@ -1,15 +1,15 @@
 // What each view is for is done at each size: desk, 1024 x 768, portrait tablet, phone. One server with something in each view; numbers against the API's.
 import assert from 'node:assert/strict';
 import { after, before, test } from 'node:test';
-import { openBrowser, openPage, picture, text } from './browser.mjs';
+import { openBrowser, openPage, opensByKeys, picture, text } from './browser.mjs';
 import { fullServer, sizes } from './full_server.mjs';
 import { eventually } from './server.mjs';
 
-let browser, server, mission, training;
+let browser, server, mission, plan, training;
 const get = async (path) => (await server.fetch(path)).json();
 
 before(async () => {
-  ({ server, mission, training } = await fullServer());
+  ({ server, mission, plan, training } = await fullServer());
   browser = await openBrowser({ hasTouch: true });
 });
 after(async () => {
@@ -73,6 +73,30 @@ for (const [size, width, height] of sizes)
     assert.deepEqual([...seen.hosts], [new URL(server.url).host]);
     assert.deepEqual(seen.errors, []);
     await page.close();
+  });
+
+for (const theme of ['light', 'sun'])
+  test(`at 1024 x 768 the tools of a view are one row, files in a list, ${theme}`, async () => {
+    for (const [view, hash] of [
+      ['plan', `#/plan/${plan}`],
+      ['anchors', '#/anchors'],
+    ]) {
+      const { page, id } = await openPage(browser, server, { width: 1024, height: 768, theme, hash });
+      await id('export').waitFor({ timeout: 20_000 });
+      const rows = await page.evaluate(() => {
+        const boxes = [...document.querySelector('.toolbar').children]
+          .filter((e) => getComputedStyle(e).position !== 'absolute')
+          .map((e) => e.getBoundingClientRect())
+          .filter((b) => b.height > 0);
+        return Math.max(...boxes.map((b) => b.top)) < Math.min(...boxes.map((b) => b.bottom)) ? 1 : 2;
+      });
+      assert.equal(rows, 1, `rows of tools in ${view}`);
+      await opensByKeys(page, id('export'), id('export-list'));
+      await id('export').click();
+      const file = await fetch(new URL(await id('geojson').getAttribute('href'), server.url));
+      assert.equal((await file.json()).type, 'FeatureCollection');
+      await page.close();
+    }
   });
 
 test('in forced colours nothing is lost: states have shape and word, buttons an edge', async () => {

@@ -1,10 +1,9 @@
 /// Columns of the anchor table: which there are, which are shown, and how latitude and longitude are written. Kept on this device.
 import { signal } from '@preact/signals';
-import { useEffect, useRef, useState } from 'preact/hooks';
 import type { AnchorRow } from '../api/anchors';
 import { sigma_h, sigma_v } from '../map/enu';
 import { accuracy, bearing, date, dms, fixed, latlon, metres } from '../ui/format';
-import { useDialog } from '../ui/use_dialog';
+import { PopList } from './pop_list';
 
 export interface Column {
   readonly key: string;
@@ -177,53 +176,35 @@ export function choose(part: Partial<Choice>): void {
 }
 
 export function ColumnPicker({ live }: { live: boolean }) {
-  const [open, set_open] = useState(false),
-    box = useRef<HTMLDivElement>(null),
-    list = useDialog<HTMLDivElement>(() => set_open(false), 'anchors', open),
-    keys = live ? choice.value.live : choice.value.published,
+  const keys = live ? choice.value.live : choice.value.published,
     name = live ? 'live' : 'published';
-  useEffect(() => {
-    if (!open) return;
-    const away = (e: Event): void => {
-      if (!(e.target instanceof Node && box.current?.contains(e.target))) set_open(false);
-    };
-    document.addEventListener('pointerdown', away);
-    return () => document.removeEventListener('pointerdown', away);
-  }, [open]);
   const toggle = (key: string): void =>
     choose({ [name]: ALL.map((c) => c.key).filter((k) => (k === key ? !keys.includes(k) : keys.includes(k))) });
   return (
-    <div class="picker" ref={box}>
-      <button class="btn" aria-expanded={open} data-testid="columns" onClick={() => set_open(!open)}>
-        Columns
+    <PopList words="Columns" label="Columns of the table" id="columns" help="anchors">
+      {ALL.filter((c) => !live || !PUBLISHED_ONLY.has(c.key)).map((c) => (
+        <label key={c.key}>
+          <input
+            type="checkbox"
+            checked={keys.includes(c.key)}
+            data-testid={`column-${c.key}`}
+            onChange={() => toggle(c.key)}
+          />
+          {c.words}
+        </label>
+      ))}
+      <label class="rule">
+        <input
+          type="checkbox"
+          checked={choice.value.dms}
+          data-testid="dms"
+          onChange={() => choose({ dms: !choice.value.dms })}
+        />
+        Degrees, minutes, seconds
+      </label>
+      <button class="btn small" onClick={() => choose({ [name]: usual(live) })}>
+        The usual ones
       </button>
-      {open && (
-        <div class="pop" {...list} aria-label="Columns of the table" data-testid="column-list">
-          {ALL.filter((c) => !live || !PUBLISHED_ONLY.has(c.key)).map((c) => (
-            <label key={c.key}>
-              <input
-                type="checkbox"
-                checked={keys.includes(c.key)}
-                data-testid={`column-${c.key}`}
-                onChange={() => toggle(c.key)}
-              />
-              {c.words}
-            </label>
-          ))}
-          <label class="rule">
-            <input
-              type="checkbox"
-              checked={choice.value.dms}
-              data-testid="dms"
-              onChange={() => choose({ dms: !choice.value.dms })}
-            />
-            Degrees, minutes, seconds
-          </label>
-          <button class="btn small" onClick={() => choose({ [name]: usual(live) })}>
-            The usual ones
-          </button>
-        </div>
-      )}
-    </div>
+    </PopList>
   );
 }

@@ -22,10 +22,10 @@ import {
 } from '../state/store';
 import type { MissionMsg } from '../live/messages';
 import { Empty, not_loaded_words } from '../ui/empty';
-import { Icon } from '../ui/marks';
 import { Unknown } from '../ui/unknown';
 import { useLater } from '../ui/use_later';
 import { ColumnPicker } from './anchor_columns';
+import { Exports } from './pop_list';
 import { AnchorTable, sorted_rows } from './anchor_table';
 import { AnchorDetail } from './anchor_detail';
 import { flight_picture } from './flight/picture';
@@ -157,7 +157,7 @@ export function Anchors({ anchor }: { anchor: string | null }) {
             data-testid="show-live"
             onClick={() => (source.value = 'live')}
           >
-            Live estimates
+            Live<span class="roomy"> estimates</span>
           </button>
           <button
             aria-pressed={!live}
@@ -196,14 +196,13 @@ export function Anchors({ anchor }: { anchor: string | null }) {
         >
           Compare
         </button>
-        <a class="btn" href={anchors_url('csv', live, of)} download="anchors.csv" data-testid="csv">
-          <Icon name="download" />
-          CSV
-        </a>
-        <a class="btn" href={anchors_url('geojson', live, of)} download="anchors.geojson" data-testid="geojson">
-          <Icon name="download" />
-          GeoJSON
-        </a>
+        <Exports
+          help="anchors"
+          files={[
+            ['CSV', anchors_url('csv', live, of), 'anchors.csv'],
+            ['GeoJSON', anchors_url('geojson', live, of), 'anchors.geojson'],
+          ]}
+        />
         {may_publish.value && (
           <button
             class="btn primary"
@@ -214,7 +213,10 @@ export function Anchors({ anchor }: { anchor: string | null }) {
               publish_open.value = true;
             }}
           >
-            Review and publish{live && all.length ? `, ${ready.done} of ${ready.total}` : ''}
+            <span>
+              Review and publish
+              {live && all.length > 0 && <span class="roomy">{`, ${ready.done} of ${ready.total}`}</span>}
+            </span>
           </button>
         )}
       </div>

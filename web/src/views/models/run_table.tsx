@@ -132,7 +132,7 @@ export function RunTable({
               {state(r)}
               {r.state === 'running' && <span class="mut"> {course_words(r)}</span>}
             </td>
-            <td>{r.dataset}</td>
+            <td class="runset">{r.dataset}</td>
             {bias ? (
               <>
                 <td class="num">{mm(r.metrics.mae_m)}</td>

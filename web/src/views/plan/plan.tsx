@@ -11,7 +11,7 @@ import { may } from '../../state/session';
 import { current_mission, current_scene, now_ms, tick, watched_lost } from '../../state/store';
 import { NotLoaded } from '../../ui/empty';
 import { age } from '../../ui/format';
-import { Icon } from '../../ui/marks';
+import { Exports } from '../pop_list';
 import { Unknown } from '../../ui/unknown';
 import { useLater } from '../../ui/use_later';
 import { PlanNotice } from '../flight/plan_notice';
@@ -163,16 +163,13 @@ function Toolbar({ desk }: { desk: Desk }) {
         }}
       />
       {plan.id && !dirty && (
-        <>
-          <a class="btn" href={export_url(plan.id, 'plan')} download={`${plan.name}.plan`}>
-            <Icon name="download" />
-            .plan
-          </a>
-          <a class="btn" href={export_url(plan.id, 'geojson')} download={`${plan.name}.geojson`}>
-            <Icon name="download" />
-            GeoJSON
-          </a>
-        </>
+        <Exports
+          help="plan"
+          files={[
+            ['.plan', export_url(plan.id, 'plan'), `${plan.name}.plan`],
+            ['GeoJSON', export_url(plan.id, 'geojson'), `${plan.name}.geojson`],
+          ]}
+        />
       )}
       {able && (
         <button

@@ -74,109 +74,65 @@ export function FlightsPanel() {
           <b>That did not work.</b> {problem}
         </div>
       )}
-      <table class="tbl">
-        <caption class="sr">The newest stored flights</caption>
-        <thead>
-          <tr>
-            <th scope="col">Flight</th>
-            <th scope="col">State</th>
-            <th scope="col">Ranges</th>
-            <th scope="col">Fixes</th>
-            <th scope="col">Hand over</th>
-            {operator && (
-              <th scope="col">
-                <span class="sr">Delete</span>
-              </th>
-            )}
-          </tr>
-        </thead>
-        <tbody>
-          {all?.map((f) => (
-            <tr key={f.id}>
-              <th scope="row">
-                {f.name || f.id.slice(0, 8)}
-                <span class="mut block">{date(f.created_at)}</span>
-              </th>
-              <td>{f.state.toUpperCase()}</td>
-              <td>{grouped(f.n_ranges)}</td>
-              <td>{grouped(f.n_fixes)}</td>
-              <td>
-                {of_every_site.value && f.state !== 'recording' && (
-                  <a
-                    class="btn small"
-                    href={handover_url(f.id)}
-                    download
-                    aria-label={`Download the hand-over pack of ${f.name || f.id.slice(0, 8)}`}
-                    data-testid="handover-flight"
-                  >
-                    Download
-                  </a>
-                )}
-                {of_every_site.value && f.state !== 'recording' && (
-                  <a
-                    class="btn small"
-                    href={flight_bundle_url(f.id)}
-                    download
-                    aria-label={`Download ${f.name || f.id.slice(0, 8)} for another anchord server`}
-                    title="All that is stored of it, for another anchord server (Import)"
-                    data-testid="bundle-flight"
-                  >
-                    Bundle
-                  </a>
-                )}
-              </td>
-              {operator && (
-                <td class="acts">
-                  {f.state === 'recording' ? (
-                    <span class="mut">finish it first</span>
-                  ) : (
-                    <button class="btn small" data-testid="delete-flight" onClick={() => remove(f)}>
-                      {sure === f.id ? 'Press again to delete' : 'Delete'}
-                    </button>
-                  )}
-                </td>
-              )}
-            </tr>
-          ))}
-        </tbody>
-      </table>
-      {!all?.length && (
-        <Empty loaded={all !== null} failed={problem !== ''}>
-          No flight is stored.
-        </Empty>
-      )}
-      {bin.length > 0 && (
-        <table class="tbl" data-testid="bin">
-          <caption>Deleted flights</caption>
+      <div class="scrollx">
+        <table class="tbl">
+          <caption class="sr">The newest stored flights</caption>
           <thead>
             <tr>
               <th scope="col">Flight</th>
-              <th scope="col">Deleted</th>
-              <th scope="col">Kept for</th>
+              <th scope="col">State</th>
+              <th scope="col">Ranges</th>
+              <th scope="col">Fixes</th>
+              <th scope="col">Hand over</th>
               {operator && (
                 <th scope="col">
-                  <span class="sr">Restore</span>
+                  <span class="sr">Delete</span>
                 </th>
               )}
             </tr>
           </thead>
           <tbody>
-            {bin.map((f) => (
+            {all?.map((f) => (
               <tr key={f.id}>
                 <th scope="row">
                   {f.name || f.id.slice(0, 8)}
-                  <span class="mut block">{grouped(f.n_ranges)} ranges</span>
+                  <span class="mut block">{date(f.created_at)}</span>
                 </th>
+                <td>{f.state.toUpperCase()}</td>
+                <td>{grouped(f.n_ranges)}</td>
+                <td>{grouped(f.n_fixes)}</td>
                 <td>
-                  {date(f.deleted_at)}
-                  <span class="mut block">by {f.deleted_by}</span>
+                  {of_every_site.value && f.state !== 'recording' && (
+                    <a
+                      class="btn small"
+                      href={handover_url(f.id)}
+                      download
+                      aria-label={`Download the hand-over pack of ${f.name || f.id.slice(0, 8)}`}
+                      data-testid="handover-flight"
+                    >
+                      Download
+                    </a>
+                  )}
+                  {of_every_site.value && f.state !== 'recording' && (
+                    <a
+                      class="btn small"
+                      href={flight_bundle_url(f.id)}
+                      download
+                      aria-label={`Download ${f.name || f.id.slice(0, 8)} for another anchord server`}
+                      title="All that is stored of it, for another anchord server (Import)"
+                      data-testid="bundle-flight"
+                    >
+                      Bundle
+                    </a>
+                  )}
                 </td>
-                <td>{f.emptying ? 'being removed' : `${days(f.kept_for_s ?? 0)} of running`}</td>
                 {operator && (
                   <td class="acts">
-                    {!f.emptying && (
-                      <button class="btn small" data-testid="restore-flight" onClick={() => restore(f)}>
-                        Restore
+                    {f.state === 'recording' ? (
+                      <span class="mut">finish it first</span>
+                    ) : (
+                      <button class="btn small" data-testid="delete-flight" onClick={() => remove(f)}>
+                        {sure === f.id ? 'Press again to delete' : 'Delete'}
                       </button>
                     )}
                   </td>
@@ -185,6 +141,55 @@ export function FlightsPanel() {
             ))}
           </tbody>
         </table>
+      </div>
+      {!all?.length && (
+        <Empty loaded={all !== null} failed={problem !== ''}>
+          No flight is stored.
+        </Empty>
+      )}
+      {bin.length > 0 && (
+        <div class="scrollx">
+          {' '}
+          <table class="tbl" data-testid="bin">
+            <caption>Deleted flights</caption>
+            <thead>
+              <tr>
+                <th scope="col">Flight</th>
+                <th scope="col">Deleted</th>
+                <th scope="col">Kept for</th>
+                {operator && (
+                  <th scope="col">
+                    <span class="sr">Restore</span>
+                  </th>
+                )}
+              </tr>
+            </thead>
+            <tbody>
+              {bin.map((f) => (
+                <tr key={f.id}>
+                  <th scope="row">
+                    {f.name || f.id.slice(0, 8)}
+                    <span class="mut block">{grouped(f.n_ranges)} ranges</span>
+                  </th>
+                  <td>
+                    {date(f.deleted_at)}
+                    <span class="mut block">by {f.deleted_by}</span>
+                  </td>
+                  <td>{f.emptying ? 'being removed' : `${days(f.kept_for_s ?? 0)} of running`}</td>
+                  {operator && (
+                    <td class="acts">
+                      {!f.emptying && (
+                        <button class="btn small" data-testid="restore-flight" onClick={() => restore(f)}>
+                          Restore
+                        </button>
+                      )}
+                    </td>
+                  )}
+                </tr>
+              ))}
+            </tbody>
+          </table>
+        </div>
       )}
     </section>
   );
