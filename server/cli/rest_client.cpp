@@ -69,9 +69,8 @@ struct RestClient::State {
       if (answer && !worth_another_try(answer.value().status))
         return make_error(errc_of(answer.value().status), what + ": " + why);
       if (!answered && SteadyClock::now() + length > began + k_never_answered)
-        return make_error(Errc::link_lost,
-                          "no anchord server answers at " + name + ": " + why +
-                              "; is it running there ('anchord doctor')? Give another address with --url");
+        return make_error(Errc::link_lost, "no anchord server answers at " + name + ": " + why +
+                                               " ('anchord doctor' looks). Give another address with --url");
       if (SteadyClock::now() + length > began + k_give_up_after)
         return make_error(Errc::link_lost, name + " " + what + ": " + why);
       if (!pause(length)) return make_error(Errc::canceled, "stopped while " + name + " was away: " + why);

@@ -154,7 +154,7 @@ int top(const Options& options) {
   if (!first && first.error().code == Errc::canceled) return 0;
   if (!first)
     return fail("no anchord server answers at " + url + ": " + first.error().message +
-                    "; is it running there ('anchord doctor')? Give another address with --url",
+                    " ('anchord doctor' looks). Give another address with --url",
                 1);
   auto documents = std::move(first).value();
   if (!documents.system.problem.empty() && !documents.devices.problem.empty())

@@ -94,6 +94,16 @@ std::optional<double> ago_s(std::optional<double> t_us, double now_us) {
   return std::max(0.0, (now_us - *t_us) / 1e6);
 }
 
+/// "12 s", "3 min", "5 h", "41 days"
+std::string age(std::optional<double> s) {
+  if (!s) return seconds(s);
+  constexpr double k_min = 60, k_h = 3600, k_day = 86'400;
+  if (*s < 2 * k_min) return seconds(s) + " s";
+  if (*s < 2 * k_h) return seconds(*s / k_min) + " min";
+  if (*s < 2 * k_day) return seconds(*s / k_h) + " h";
+  return seconds(*s / k_day) + " days";
+}
+
 std::optional<double> time_us(const Json& json, const char* key) {
   const auto t = parse_rfc3339(text(json, key));
   return t ? std::optional(static_cast<double>(t.value().us())) : std::nullopt;
@@ -229,7 +239,7 @@ Section devices(const TopDocuments& documents, double now_us, std::size_t width)
                      "no device is set up: run anchord devices discover, then anchord devices add");
   if (radios > 0)
     out.lines.push_back("Radios seen in the measurements: " + std::to_string(radios) + ", last seen " +
-                        seconds(last_radio_s) + " s ago");
+                        age(last_radio_s) + " ago");
   return out;
 }
 
