@@ -23,6 +23,7 @@
 #include "core/geo/track_segments.hpp"
 #include "core/localize/accuracy_goal.hpp"
 #include "core/ports/feature_file.hpp"
+#include "core/ports/print_pdf.hpp"
 #include "core/ports/stores.hpp"
 #include "core/types/feature_table.hpp"
 
@@ -104,6 +105,9 @@ class Application {
     MakeFeatureFile feature_file = [](const std::filesystem::path&, const FeatureTable&,
                                       UtcTime) -> Result<std::unique_ptr<FeatureFile>> {
       return Error{Errc::unsupported, "this program writes no GeoPackage"};
+    };
+    PrintPdf print_pdf = [](const std::filesystem::path&, const std::filesystem::path&) -> Result<void> {
+      return Error{Errc::unsupported, "this program prints no PDF"};
     };
     /// Where bundles are made and uploads of them wait; emptied by whoever owns it.
     std::filesystem::path spool_dir{std::filesystem::temp_directory_path() / "anchord-spool"};

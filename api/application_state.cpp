@@ -188,7 +188,8 @@ Application::State::State(Deps d)
                  .key = signer.key(),
                  .ask = [this](Request& request) { return router.handle(request); },
                  .measurements = seen.measurements,
-                 .feature_file = deps.feature_file},
+                 .feature_file = deps.feature_file,
+                 .print_pdf = deps.print_pdf},
       learning_stores{stores.campaigns, stores.labels, stores.datasets, stores.training_runs, stores.models},
       learning_api{
           learning_stores,

@@ -95,6 +95,22 @@ Result<std::filesystem::path> make_bundle(BundleApi& api, const Mission& mission
   return file;
 }
 
+Result<BundleEntry> entry_of(const std::string& name, const std::filesystem::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  BundleEntry entry{name, 0, 0, ""};
+  Sha256 sum;
+  std::vector<char> buffer(k_write_bytes);
+  while (file) {
+    file.read(buffer.data(), static_cast<std::streamsize>(buffer.size()));
+    const auto n = static_cast<std::size_t>(file.gcount());
+    sum.add(std::string_view(buffer.data(), n));
+    entry.bytes += n;
+  }
+  if (!file.eof()) return make_error(Errc::storage_unavailable, "cannot read " + name + " again");
+  entry.sha256_hex = sum.hex();
+  return entry;
+}
+
 Result<void> BundleZipSource::open(const BundleTable& table) {
   table_ = &table;
   BOOST_OUTCOME_TRY(auto lines, ZipLines::open(zip_, bundle_entry_name(table)));

@@ -51,6 +51,9 @@ class FolderSink final : public BundleSink {
 Result<std::filesystem::path> make_bundle(BundleApi& api, const Mission& mission, const Principal& who,
                                           const SpoolFolder& folder);
 
+/// Size and digest of a file under this name. errors: storage_unavailable
+Result<BundleEntry> entry_of(const std::string& name, const std::filesystem::path& path);
+
 /// Rows of a bundle whose digests were checked.
 class BundleZipSource final : public BundleSource {
  public:

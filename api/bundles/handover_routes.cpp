@@ -90,17 +90,13 @@ class Pack {
     sums_.push_back({name, sum.hex()});
     value_or_problem(zip_.add_text(name, std::move(text)));
   }
-  void add_bundle(const std::filesystem::path& file) {
-    Sha256 sum;
-    std::ifstream in(file, std::ios::binary);
-    std::string part(std::size_t{1} << 18, '\0');
-    while (in.read(part.data(), static_cast<std::streamsize>(part.size())) || in.gcount() > 0)
-      sum.add(std::string_view(part).substr(0, static_cast<std::size_t>(in.gcount())));
-    sums_.push_back({std::string(k_pack_bundle), sum.hex()});
-    value_or_problem(zip_.add_file(std::string(k_pack_bundle), file, true));
+  void add_file(const std::string& name, const std::filesystem::path& file) {
+    sums_.push_back({name, value_or_problem(entry_of(name, file)).sha256_hex});
+    value_or_problem(zip_.add_file(name, file, true));
   }
   /// An answer of this server, where it has one; else why it is left out.
-  void add_answer(const std::string& name, const std::string& path, const std::string& box = {}) {
+  /// The answer, empty where it is left out.
+  std::string add_answer(const std::string& name, const std::string& path, const std::string& box = {}) {
     Request asked;
     asked.path = path;
     if (!box.empty()) asked.query["bbox"] = box;
@@ -108,11 +104,15 @@ class Pack {
     asked.remote = request_.remote;
     Response answer = s_.ask(asked);
     std::string body = whole_body(answer);
-    if (answer.status == 200) return add(name, std::move(body));
-    if (answer.status == 404) return leave_out(name, "this server does not provide it");
+    if (answer.status == 200) {
+      add(name, body);
+      return body;
+    }
     const auto problem = nlohmann::json::parse(body, nullptr, false);
     const bool told = problem.is_object() && problem.contains("detail") && problem["detail"].is_string();
-    leave_out(name, told ? problem["detail"].get<std::string>() : "this server does not provide it");
+    leave_out(name, told && answer.status != 404 ? problem["detail"].get<std::string>()
+                                                 : "this server does not provide it");
+    return {};
   }
   void leave_out(const std::string& name, const std::string& why) {
     left_out_.push_back({{"name", name}, {"why", why}});
@@ -145,6 +145,19 @@ class Pack {
   Ordered left_out_ = Ordered::array();
 };
 
+/// The report as every browser shows it, and as PDF where this machine prints one.
+void add_report(BundleApi& s, Pack& pack, const Calibration& calibration, const SpoolFolder& folder) {
+  const std::string html =
+      pack.add_answer("report.html", "/api/v1/calibrations/" + to_string(calibration.id) + "/report");
+  if (html.empty()) return;
+  const auto page = folder.path("report.html"), pdf = folder.path("report.pdf");
+  std::ofstream(page, std::ios::binary) << html;
+  if (const auto printed = s.print_pdf(page, pdf))
+    pack.add_file("report.pdf", pdf);
+  else
+    pack.leave_out("report.pdf", printed.error().message);
+}
+
 Response handover(BundleApi& s, const Request& request) {
   check_query(request, {});
   const Mission mission = s.named(request);
@@ -155,9 +168,9 @@ Response handover(BundleApi& s, const Request& request) {
   const auto file = folder->path("handover.zip");
   auto zip = value_or_problem(ZipWriter::create(file));
   Pack pack(s, request, zip);
-  pack.add_bundle(bundle);
+  pack.add_file(std::string(k_pack_bundle), bundle);
   if (calibration)
-    pack.add_answer("report.html", "/api/v1/calibrations/" + to_string(calibration->id) + "/report");
+    add_report(s, pack, *calibration, *folder);
   else
     pack.leave_out("report.html", "the mission has no calibration: calibrate it first");
   for (const auto& one : k_exported) {

@@ -8,6 +8,7 @@
 #include "api/kit/audit.hpp"
 #include "core/base/ids.hpp"
 #include "core/ports/feature_file.hpp"
+#include "core/ports/print_pdf.hpp"
 #include "core/types/mission.hpp"
 
 namespace anchord {
@@ -57,6 +58,7 @@ struct BundleApi {
   std::function<Response(Request&)> ask;
   MeasurementStore& measurements;
   MakeFeatureFile feature_file;
+  PrintPdf print_pdf;
 };
 
 /// GET /api/v1/missions/{id}/bundle, GET /api/v1/sites/{id}/bundle, GET /api/v1/missions/{id}/ranges.gpkg

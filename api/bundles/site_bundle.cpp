@@ -8,7 +8,6 @@
 #include "api/bundles/bundle_file.hpp"
 #include "api/bundles/bundle_import.hpp"
 #include "api/bundles/spool.hpp"
-#include "core/base/sha256.hpp"
 #include "core/ports/mission_store.hpp"
 #include "core/types/anchor.hpp"
 
@@ -35,22 +34,6 @@ Result<std::vector<Mission>> missions_of(MissionStore& store, const SiteId& site
   }
   std::ranges::reverse(out);
   return out;
-}
-
-Result<BundleEntry> entry_of(const std::string& name, const std::filesystem::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  BundleEntry entry{name, 0, 0, ""};
-  Sha256 sum;
-  std::vector<char> buffer(k_copied_bytes);
-  while (file) {
-    file.read(buffer.data(), static_cast<std::streamsize>(buffer.size()));
-    const auto n = static_cast<std::size_t>(file.gcount());
-    sum.add(std::string_view(buffer.data(), n));
-    entry.bytes += n;
-  }
-  if (!file.eof()) return make_error(Errc::storage_unavailable, "cannot read " + name + " again");
-  entry.sha256_hex = sum.hex();
-  return entry;
 }
 
 /// The bundle of a flight, out of that of its site.

@@ -26,6 +26,7 @@
 #include "server/http/web_post.hpp"
 #include "server/mqtt/mqtt_broker.hpp"
 #include "server/runtime/backup_keeper.hpp"
+#include "server/runtime/chromium_pdf.hpp"
 #include "server/runtime/database_worker.hpp"
 #include "server/runtime/device_manager.hpp"
 #include "server/runtime/logging.hpp"
@@ -377,6 +378,7 @@ void App::State::compose() {
   deps.server_alarms = [this] { return alarms(); };
   deps.geopackage = geopackage;
   deps.feature_file = make_geopackage_file;
+  deps.print_pdf = print_with_chromium;
   deps.spool_dir = emptied_spool(data_dir);
   web_post = make_web_post(config.flag("webhooks.allow_private"), config.text("webhooks.ca_file"));
   deps.web_post = web_post.get();

@@ -125,7 +125,15 @@ class Bundles : public AppFixture {
     options.headers["prefer"] = "wait=120";
     return server.call(Method::post, "/api/v1/calibrations", R"({"missions":[")" + mission + "\"]}", options);
   }
-  void configure(api::Application::Deps& deps) override { deps.spool_dir = dir_ / "spool"; }
+  void configure(api::Application::Deps& deps) override {
+    deps.spool_dir = dir_ / "spool";
+    deps.print_pdf = [this](const std::filesystem::path& html, const std::filesystem::path& pdf) {
+      if (!prints_) return Result<void>(make_error(Errc::unsupported, "nothing prints here"));
+      std::ofstream(pdf) << "%PDF-1.7 of " << std::filesystem::file_size(html);
+      return Result<void>(boost::outcome_v2::success());
+    };
+  }
+  bool prints_{false};
   static Json json_of(const std::string& text) { return Json::parse(text); }
   std::string path(const char* tail) const { return "/api/v1/missions/" + to_string(id_) + tail; }
   std::string bundle() {
@@ -606,6 +614,7 @@ TEST_F(Bundles, AreHandedOverInAPackThatItsSignatureCovers) {
   EXPECT_EQ(json_of(content(entries, "anchors.geojson"))["features"].size(), 1u) << "what is published of it";
   // Of a site without a map system there is no drawing, and the pack says so.
   EXPECT_NE(contents["left_out"].dump().find("anchors.dxf"), std::string::npos) << contents;
+  EXPECT_NE(contents["left_out"].dump().find("nothing prints here"), std::string::npos) << contents;
   const auto key = json(get("/api/v1/signing-key"));
   EXPECT_EQ(get("/api/v1/signing-key", {{"format", "pem"}}).body, key["public_key"]);
   const auto known = Ed25519Public::parse_pem(key["public_key"].get<std::string>()).value();
@@ -621,6 +630,15 @@ TEST_F(Bundles, AreHandedOverInAPackThatItsSignatureCovers) {
   OtherServer other;
   EXPECT_EQ(other.take(content(entries, "bundle.anchord")).status, 201)
       << "the bundle in it is one to import";
+}
+
+TEST_F(Bundles, HaveThePrintedReportInTheirPackWhereTheMachinePrintsOne) {
+  prints_ = true;
+  auto entries = entries_of(text(get(path("/handover"))));
+  const std::string html = content(entries, "report.html"), pdf = content(entries, "report.pdf");
+  EXPECT_EQ(pdf, "%PDF-1.7 of " + std::to_string(html.size())) << "what was printed is the report";
+  EXPECT_NE(content(entries, "SHA256SUMS").find("  report.pdf\n"), std::string::npos)
+      << "signed with the rest";
 }
 
 TEST_F(Bundles, LeaveNothingBehindInTheSpoolFolder) {

@@ -1,0 +1,48 @@
+#include "server/runtime/chromium_pdf.hpp"
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <fstream>
+#include <sstream>
+
+#include "tests/server/storage/scratch_dir.hpp"
+
+namespace anchord::server {
+namespace {
+
+std::string content(const std::filesystem::path& file) {
+  std::ostringstream text;
+  text << std::ifstream(file, std::ios::binary).rdbuf();
+  return text.str();
+}
+
+TEST(ChromiumPdf, PrintsAPageOfItsOwnAndLeavesNothingElse) {
+  if (::access("/usr/bin/chromium", X_OK) != 0)
+    GTEST_SKIP() << "NOT TESTED: Debian package chromium is not installed";
+  const ScratchDir dir;
+  const auto page = dir.path() / "a report.html", pdf = dir.path() / "report.pdf";
+  std::ofstream(page) << "<!doctype html><meta charset=utf-8><h1>Hall \xC3\xA9 &amp; &lt;b&gt;</h1>"
+                         "<img src=http://192.0.2.1/x.png>";
+  const auto printed = print_with_chromium(page, pdf);
+  ASSERT_TRUE(printed) << printed.error().message;
+  const std::string bytes = content(pdf);
+  EXPECT_TRUE(bytes.starts_with("%PDF-")) << bytes.substr(0, 20);
+  EXPECT_NE(bytes.find("%%EOF"), std::string::npos);
+  std::size_t n = 0;
+  for ([[maybe_unused]] const auto& left : std::filesystem::directory_iterator(dir.path())) ++n;
+  EXPECT_EQ(n, 2u) << "its profile is gone";
+}
+
+TEST(ChromiumPdf, SaysThatThereIsNoPage) {
+  if (::access("/usr/bin/chromium", X_OK) != 0)
+    GTEST_SKIP() << "NOT TESTED: Debian package chromium is not installed";
+  const ScratchDir dir;
+  const auto printed =
+      print_with_chromium(dir.path() / "none" / "x.html", dir.path() / "none" / "report.pdf");
+  ASSERT_FALSE(printed);
+  EXPECT_EQ(printed.error().code, Errc::internal);
+}
+
+}  // namespace
+}  // namespace anchord::server
