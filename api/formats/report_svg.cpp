@@ -6,10 +6,17 @@
 #include <cstdio>
 #include <limits>
 
+#include "core/base/text.hpp"
 #include "core/localize/error_ellipse.hpp"
 
 namespace anchord::report {
 namespace {
+
+constexpr std::size_t k_name_bytes = 24;  // on the map; the table below it has the whole name
+
+std::string short_name(const std::string& name) {
+  return name.size() <= k_name_bytes ? name : to_utf8(name, k_name_bytes) + "\u2026";
+}
 
 constexpr double k_width = 560, k_height = 338, k_foot = 30;
 
@@ -221,8 +228,8 @@ std::string map(const Report& report) {
     const char* side = left ? "end" : "start";
     const double at = left ? x - 11 : x + 11;
     out += symbol(x, y, anchor);
-    out +=
-        label(at, y - 1, anchor.name.empty() ? to_string(anchor.estimate.anchor) : anchor.name, "id", side);
+    out += label(at, y - 1, anchor.name.empty() ? to_string(anchor.estimate.anchor) : short_name(anchor.name),
+                 "id", side);
     const bool good = anchor.published || anchor.estimate.acceptable();
     out +=
         label(at, y + 11, good ? "±" + fixed(anchor.estimate.h95_m * 100, 0) + " cm" : "withheld", "t", side);

@@ -118,7 +118,7 @@ export function FlightsPanel() {
                       class="btn small"
                       href={flight_bundle_url(f.id)}
                       download
-                      aria-label={`Download ${f.name || f.id.slice(0, 8)} for another anchord server`}
+                      aria-label={`Bundle of ${f.name || f.id.slice(0, 8)}, for another anchord server`}
                       title="All that is stored of it, for another anchord server (Import)"
                       data-testid="bundle-flight"
                     >
