@@ -181,7 +181,7 @@ void name_the_wrong(std::span<const PixelPair> pairs, const std::vector<LeftOut>
   } else if (fit.redundancy <= 2) {
     fit.notes.push_back(
         text("the points disagree by up to %.2f m, and %.0f points cannot show which one is "
-             "wrong: click another one, or give the plan's scale",
+             "wrong: click another one, or give a measured length",
              worst, static_cast<double>(pairs.size())));
   } else {
     fit.notes.push_back(

@@ -42,14 +42,23 @@ export async function send_plan(held: Held, file: Blob): Promise<Held> {
   return { floor: body, etag };
 }
 export const preview_url = (floor: string): string => url('/floors/{id}/plan/preview', { path: { id: floor } });
-/// `keep` false: only what the residuals would be.
-export async function georeference(held: Held, points: readonly Click[], keep: boolean): Promise<Held> {
+/// `keep` false: only what the residuals would be. `length_m`: between the first two points, as measured.
+export async function georeference(
+  held: Held,
+  points: readonly Click[],
+  length_m: number | null,
+  keep: boolean,
+): Promise<Held> {
+  const pixel = (k: number): [number, number] => [points[k]!.pixel[0], points[k]!.pixel[1]];
   const { body, etag } = await call('put', '/floors/{id}/plan/georeference', {
     path: { id: held.floor.id },
     query: keep ? {} : { dry_run: true },
     body: {
       model: 'helmert',
-      points: points.map((p) => ({ pixel: [p.pixel[0], p.pixel[1]], lon: p.lon, lat: p.lat })),
+      points: points.map((p, k) => ({ pixel: pixel(k), lon: p.lon, lat: p.lat })),
+      ...(length_m === null || points.length < 2
+        ? {}
+        : { known_length: { from_px: pixel(0), to_px: pixel(1), length_m } }),
     },
     headers: { 'If-Match': held.etag },
   });

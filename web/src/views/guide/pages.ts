@@ -188,7 +188,7 @@ export const PAGES: readonly Page[] = [
         steps: [
           'Plan, Floor plan: choose the floor, or make one.',
           'Send the picture: PNG, JPEG, GeoTIFF, a page of a PDF, or a DXF drawing.',
-          'Click three or more corners far apart and give the place of each; a fourth shows which one is wrong.',
+          'Click three or more corners far apart and give the place of each; a fourth, or the measured length between the first two, shows which one is wrong.',
           'Trace finds outline and walls: choose the material of the walls and accept them, or use the outline for the plan.',
         ],
       },

@@ -123,9 +123,9 @@ export function FloorPlanDialog({ corners, close, use_outline }: Props) {
           held={held}
           corners={corners}
           busy={busy}
-          keep={(points) =>
+          keep={(points, length_m) =>
             work('place', async () => {
-              set_held(await georeference(held, points, true));
+              set_held(await georeference(held, points, length_m, true));
               follow_floors(true);
               say(`${held.floor.name}: the plan is placed`);
             })
@@ -218,6 +218,13 @@ function Sent({ held, busy, send }: { held: Held; busy: string; send: (file: Fil
   );
 }
 
+/// Null where nothing is given, undefined where it is no length.
+function length_of(text: string): number | null | undefined {
+  if (!text.trim()) return null;
+  const m = Number(text.trim().replace(',', '.'));
+  return m >= 0.1 && m <= 10_000 ? m : undefined;
+}
+
 /// Clicks on the picture, a place for each, and how well they agree.
 function Placed({
   held,
@@ -228,20 +235,23 @@ function Placed({
   held: Held;
   corners: readonly Corner[];
   busy: string;
-  keep: (points: Click[]) => void;
+  keep: (points: Click[], length_m: number | null) => void;
 }) {
   const [rows, set_rows] = useState<readonly Row[]>([]),
+    [measured, set_measured] = useState(''),
     [fit, set_fit] = useState<Georeference | null>(held.floor.georeference),
     [problem, set_problem] = useState('');
   const plan = held.floor.plan!,
     points = clicks_of(rows),
     complete = points.length === rows.length && rows.length >= 2,
-    asked = complete ? JSON.stringify(points) : '';
+    length_m = length_of(measured),
+    asked = complete && length_m !== undefined ? JSON.stringify({ points, length_m }) : '';
   useEffect(() => {
     set_problem('');
     if (!asked) return;
     let gone = false;
-    georeference(held, JSON.parse(asked) as Click[], false).then(
+    const { points: clicked, length_m: length } = JSON.parse(asked) as { points: Click[]; length_m: number | null };
+    georeference(held, clicked, length, false).then(
       (tried) => {
         if (!gone) set_fit(tried.floor.georeference);
       },
@@ -257,8 +267,8 @@ function Placed({
   return (
     <>
       <p class="why">
-        Click three or more corners on the plan, far apart, and give the place of each. A fourth shows which one is
-        wrong.
+        Click three or more corners on the plan, far apart, and give the place of each. A fourth, or the measured length
+        between the first two, shows which one is wrong.
       </p>
       <div class="clickplan">
         <img
@@ -329,6 +339,20 @@ function Placed({
           </tbody>
         </table>
       )}
+      {rows.length > 1 && (
+        <label>
+          Measured between 1 and 2, m (optional){' '}
+          <input
+            inputMode="decimal"
+            size={8}
+            value={measured}
+            data-testid="known-length"
+            aria-invalid={length_m === undefined}
+            onInput={(e) => set_measured(e.currentTarget.value)}
+          />
+          {length_m === undefined && <span class="bad"> is not a length in metres</span>}
+        </label>
+      )}
       {problem && (
         <p class="why" role="status">
           {problem}
@@ -344,8 +368,8 @@ function Placed({
         <button
           class="btn primary"
           data-testid="place-plan"
-          disabled={!complete || busy !== ''}
-          onClick={() => keep(points)}
+          disabled={!complete || length_m === undefined || busy !== ''}
+          onClick={() => keep(points, length_m ?? null)}
         >
           {busy === 'place' ? 'Placing' : 'Place the plan'}
         </button>
