@@ -1,5 +1,6 @@
 #include <nlohmann/json.hpp>
 
+#include "api/anchors/geo_service.hpp"
 #include "api/anchors/routes.hpp"
 #include "api/anchors/site_json.hpp"
 #include "api/kit/id_page.hpp"
@@ -29,10 +30,21 @@ Response list(AnchorApi& s, const Request& request) {
       [&](const auto& site) { return site_json(site); });
 }
 
+/// A code that no export could use is refused where it is given; whether the base's datum leads to it is not
+/// asked yet, for that may be stated later.
+void check_map(GeoService& geo, const Site& site, std::vector<FieldError>& errors) {
+  const std::string datum = geographic_epsg(site.crs_frame) ? site.crs_frame : "WGS84";
+  const auto map = geo.projection(*site.projected_epsg, datum);
+  if (map && map.value()->unusable().empty()) return;
+  if (!map && map.error().code == Errc::unsupported) return;
+  errors.push_back({"/projected_epsg", "not_usable", map ? map.value()->unusable() : map.error().message});
+}
+
 Response create(AnchorApi& s, const Request& request) {
   std::vector<FieldError> errors;
   Site site;
   patch_site(json_body(request), true, site, errors);
+  if (site.projected_epsg) check_map(s.geo, site, errors);
   refuse_if_any(errors);
   site.created = s.clock.now();
   site.id.uuid = make_uuid_v7(site.created);
@@ -47,7 +59,9 @@ Response patch(AnchorApi& s, const Request& request) {
   Site site = value_or_problem(s.sites.site(path_id<SiteId>(request)));
   require_match(request, etag(site));
   std::vector<FieldError> errors;
+  const auto before = site.projected_epsg;
   patch_site(json_body(request), false, site, errors);
+  if (site.projected_epsg && site.projected_epsg != before) check_map(s.geo, site, errors);
   refuse_if_any(errors);
   value_or_problem(s.sites.update(site, site.version));
   ++site.version;

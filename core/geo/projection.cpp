@@ -129,6 +129,8 @@ Result<Projection> Projection::open(int epsg, int geographic_epsg) {
   return Projection(epsg, std::move(name), std::move(pipeline));
 }
 
+const std::string& Projection::unusable() const { return pipeline_->unusable; }
+
 Result<Eigen::Vector2d> Projection::easting_northing_m(const Wgs84& at) const {
   if (!pipeline_->unusable.empty()) return make_error(Errc::unsupported, pipeline_->unusable);
   const auto use = pipeline_->transformation.lock();

@@ -32,6 +32,8 @@ class Projection {
 
   int epsg() const { return epsg_; }
   const std::string& name() const { return name_; }
+  /// Why no easting and northing in metres comes of it (feet, axes to the south); empty: it does.
+  const std::string& unusable() const;
   /// Easting and northing, whatever order the system's own axes have. errors: invalid_argument outside the
   /// projection. accuracy: PROJ's, below 1 mm within a zone, plus that of the datum shift where there is one.
   Result<Eigen::Vector2d> easting_northing_m(const Wgs84& at) const;

@@ -155,6 +155,27 @@ TEST_F(AnchorFiles, DoNotGuessAHeight) {
   EXPECT_EQ(file("gpkg", {{"height", "ellipsoidal"}}).status, 422) << "it has both";
 }
 
+TEST_F(AnchorFiles, NeedAMapSystemThatCanBeUsedWhereItIsNamed) {
+  const auto made = [&](int epsg) {
+    return post("/api/v1/sites", R"({"name":"M)" + std::to_string(epsg) + R"(","projected_epsg":)" +
+                                     std::to_string(epsg) + '}');
+  };
+  // No such code; geographic, not a map; California zone 1 in US feet; South African, which counts south and
+  // west.
+  for (const int epsg : {999'998, 4326, 2225, 2048}) {
+    const auto refused = made(epsg);
+    EXPECT_EQ(refused.status, 422) << epsg << refused.body;
+    EXPECT_NE(refused.body.find("/projected_epsg"), std::string::npos) << refused.body;
+  }
+  const auto utm = made(25831);
+  ASSERT_EQ(utm.status, 201) << utm.body;
+  Call merge;
+  merge.type = "application/merge-patch+json";
+  merge.headers["if-match"] = header(utm, "ETag");
+  EXPECT_EQ(call(api::Method::patch, header(utm, "Location"), R"({"projected_epsg":2225})", merge).status,
+            422);
+}
+
 TEST_F(AnchorFiles, OfTwoMapSystemsAreRefused) {
   publish(true);
   const auto other = post("/api/v1/sites", R"({"name":"B","projected_epsg":25832,"crs":{"frame":"ETRS89"}})");
