@@ -12,6 +12,8 @@
 #include <thread>
 #include <vector>
 
+#include "server/runtime/spawn_attributes.hpp"
+
 namespace anchord::server {
 namespace {
 
@@ -35,21 +37,12 @@ pid_t start(std::vector<std::string> words) {
   for (const int fd : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO})
     posix_spawn_file_actions_addopen(&actions, fd, "/dev/null", fd == STDIN_FILENO ? O_RDONLY : O_WRONLY, 0);
   posix_spawn_file_actions_addclosefrom_np(&actions, STDERR_FILENO + 1);
-  posix_spawnattr_t attributes;
-  posix_spawnattr_init(&attributes);
-  sigset_t none, all;
-  sigemptyset(&none);
-  sigfillset(&all);
-  posix_spawnattr_setsigmask(&attributes, &none);
-  posix_spawnattr_setsigdefault(&attributes, &all);
-  posix_spawnattr_setpgroup(&attributes, 0);
-  posix_spawnattr_setflags(&attributes,
-                           POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF | POSIX_SPAWN_SETPGROUP);
+  const SpawnAttributes attributes(true);
   std::string path = "PATH=/usr/bin:/bin";
   char* environment[] = {path.data(), nullptr};
   pid_t pid = -1;
-  if (posix_spawn(&pid, arguments[0], &actions, &attributes, arguments.data(), environment) != 0) pid = -1;
-  posix_spawnattr_destroy(&attributes);
+  if (posix_spawn(&pid, arguments[0], &actions, attributes.get(), arguments.data(), environment) != 0)
+    pid = -1;
   posix_spawn_file_actions_destroy(&actions);
   return pid;
 }

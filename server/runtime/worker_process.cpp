@@ -16,6 +16,7 @@
 #include "core/base/errc_words.hpp"
 #include "core/base/text.hpp"
 #include "server/runtime/frames.hpp"
+#include "server/runtime/spawn_attributes.hpp"
 
 extern char** environ;
 
@@ -100,15 +101,7 @@ Result<pid_t> spawn(const std::filesystem::path& program, int socket) {
   posix_spawn_file_actions_adddup2(&actions, socket, STDIN_FILENO);
   posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, "/dev/null", O_WRONLY, 0);
   posix_spawn_file_actions_addclosefrom_np(&actions, STDERR_FILENO + 1);
-  posix_spawnattr_t attributes;
-  posix_spawnattr_init(&attributes);
-  // The server blocks its signals in every thread; its child must hear its own.
-  sigset_t none, all;
-  sigemptyset(&none);
-  sigfillset(&all);
-  posix_spawnattr_setsigmask(&attributes, &none);
-  posix_spawnattr_setsigdefault(&attributes, &all);
-  posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF);
+  const SpawnAttributes attributes;
   // Settings of the server may be secrets, and are none of the worker's business.
   std::vector<char*> environment;
   for (char** one = environ; *one != nullptr; ++one)
@@ -117,9 +110,9 @@ Result<pid_t> spawn(const std::filesystem::path& program, int socket) {
   std::string name = "anchord", word = "worker";
   char* arguments[] = {name.data(), word.data(), nullptr};
   pid_t pid = 0;
-  const int failed = posix_spawn(&pid, program.c_str(), &actions, &attributes, arguments, environment.data());
+  const int failed =
+      posix_spawn(&pid, program.c_str(), &actions, attributes.get(), arguments, environment.data());
   posix_spawn_file_actions_destroy(&actions);
-  posix_spawnattr_destroy(&attributes);
   if (failed != 0)
     return make_error(Errc::internal, std::string("cannot start a worker process: ") + std::strerror(failed));
   return pid;

@@ -40,17 +40,7 @@ TEST_F(FlightEventRoutes, SayWhereTheAircraftWasSent) {
   const auto id = make_id("sent");
   fly(id);
   // The pilot flies by hand: once in the air, to the first waypoint of the plan.
-  for (int i = 0; i < 20; ++i) {
-    now_s_ = now_s_ + 0.1;
-    char row[240];
-    std::snprintf(row, sizeof row,
-                  R"({"t_us":%lld,"lon":3.7129716,"lat":51.0230191,"h_m":59.5,"fix":"fixed",)"
-                  R"("sigma_m":[0.01,0.01,0.02],"correction_age_s":0.8})"
-                  "\n",
-                  1'777'889'472'000'000LL + std::llround(now_s_ * 1e6));
-    EXPECT_EQ(post("/api/v1/fixes", row, "application/x-ndjson", {{"mission", id}}).status, 200);
-    app_->fly();
-  }
+  fix_at(id, 20, 59.5);
   const auto all = events(id);
   const auto sent =
       std::ranges::find_if(all, [](const Json& e) { return e["code"] == "procedure.go_to_waypoint"; });

@@ -115,6 +115,20 @@ class KeptFixture : public AppFixture {
     for (const auto& event : events["items"]) out.push_back(event.value("code", ""));
     return out;
   }
+  /// The aircraft at this height for n tenths of a second.
+  void fix_at(const std::string& id, int n, double height_m) {
+    for (int i = 0; i < n; ++i) {
+      now_s_ = now_s_ + 0.1;
+      char row[240];
+      std::snprintf(row, sizeof row,
+                    R"({"t_us":%lld,"lon":3.7129716,"lat":51.0230191,"h_m":%.1f,"fix":"fixed",)"
+                    R"("sigma_m":[0.01,0.01,0.02],"correction_age_s":0.8})"
+                    "\n",
+                    1'777'889'472'000'000LL + std::llround(now_s_ * 1e6), height_m);
+      EXPECT_EQ(post("/api/v1/fixes", row, "application/x-ndjson", {{"mission", id}}).status, 200);
+      app_->fly();
+    }
+  }
   /// A mission in the air by hand, and its lease; more of its plan and of the settings in it.
   std::string fly(const std::string& id, const std::string& of_plan = "", const std::string& setting = "") {
     const auto plan = json(post("/api/v1/plans", R"({"name":"Hall","building_height_m":8,)" + of_plan + R"(
@@ -124,17 +138,7 @@ class KeptFixture : public AppFixture {
       "waypoints":[{"lon":3.7130,"lat":51.02305,"height_above_ground_m":4},
                    {"lon":3.71362,"lat":51.02305,"height_above_ground_m":9}]})"));
     plan_ = plan["id"];
-    for (int i = 0; i < 120; ++i) {
-      now_s_ = now_s_ + 0.1;
-      char row[240];
-      std::snprintf(row, sizeof row,
-                    R"({"t_us":%lld,"lon":3.7129716,"lat":51.0230191,"h_m":55.5,"fix":"fixed",)"
-                    R"("sigma_m":[0.01,0.01,0.02],"correction_age_s":0.8})"
-                    "\n",
-                    1'777'889'472'000'000LL + std::llround(now_s_ * 1e6));
-      EXPECT_EQ(post("/api/v1/fixes", row, "application/x-ndjson", {{"mission", id}}).status, 200);
-      app_->fly();
-    }
+    fix_at(id, 120, 55.5);
     for (const char* item : {"props", "airspace", "people", "pilot", "tag", "disk", "battery"})
       post(path(id, "/checklist/") + item, R"({"reason":"looked at it"})");
     const std::string key = lease(id);
