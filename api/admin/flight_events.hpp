@@ -18,7 +18,7 @@ namespace anchord::api {
 
 class LateWriter;
 
-/// The events of flights, which outlive the server: stored after they were told, since a flight waits for no
+/// The events of flights, which outlive the server: stored after they were published, since a flight waits for no
 /// disk, and read with those that are not stored yet. Thread-safe.
 class FlightEvents {
  public:

@@ -60,14 +60,14 @@ void prepend(BundleNote& note, std::string line) {
 std::vector<BundleNote> bundle_notes(const FlightEvents& events, AccessStore& audit, const Mission& mission,
                                      const Principal& who) {
   std::vector<BundleNote> out;
-  BundleNote told{k_events, "", 0};
+  BundleNote noted{k_events, "", 0};
   if (const auto all = events.all(mission.id, k_most_events)) {
     for (const auto& event : all.value()) {
-      told.text += event_json(event) + '\n';
-      ++told.rows;
+      noted.text += event_json(event) + '\n';
+      ++noted.rows;
     }
   }
-  out.push_back(std::move(told));
+  out.push_back(std::move(noted));
   if (!who.has(Role::admin)) return out;
   const auto entries = audit.audit(k_looked_at);
   if (!entries) return out;

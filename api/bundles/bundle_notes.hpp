@@ -21,7 +21,7 @@ struct BundleManifest;
 std::vector<BundleNote> bundle_notes(const FlightEvents& events, AccessStore& audit, const Mission& mission,
                                      const Principal& who);
 
-/// The events that a bundle tells of its flight, in the order in which they came; none where it has no such
+/// The events in the notes of a bundle, in the order in which they came; none where it has no such
 /// note. errors: those of the zip file; bad_frame, naming the line that is none
 Result<std::vector<LiveEvent>> noted_events(const ZipReader& zip, const BundleManifest& manifest);
 

@@ -27,7 +27,7 @@ namespace anchord::api {
 
 class Router;
 
-/// What is told of a flight beside its rows, for a person who opens the bundle. Of these its events are
+/// What a bundle has of a flight beside its rows, for a person who opens it. Of these its events are
 /// imported (bundle_notes.hpp).
 struct BundleNote {
   std::string name;  ///< "events.ndjson"

@@ -1,4 +1,4 @@
--- What happened during a flight outlives the server that told of it: a replay shows procedure and alarms of each moment.
+-- Events of a flight, which a restart of the server leaves as they are: a replay shows procedure and alarms of each moment.
 CREATE TABLE mission_event (
   event_key INTEGER PRIMARY KEY, -- in the order in which they came
   id BLOB NOT NULL UNIQUE CHECK (length(id) = 16),

@@ -1,8 +1,6 @@
 #include "server/runtime/chromium_pdf.hpp"
 
-#include <fcntl.h>
 #include <signal.h>
-#include <spawn.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -12,7 +10,7 @@
 #include <thread>
 #include <vector>
 
-#include "server/runtime/spawn_attributes.hpp"
+#include "server/runtime/start_program.hpp"
 
 namespace anchord::server {
 namespace {
@@ -25,26 +23,6 @@ std::string installed() {
   for (const char* program : k_programs)
     if (::access(program, X_OK) == 0) return program;
   return {};
-}
-
-/// In a process group of its own, so that all of its processes end with it; -1 where it does not start.
-pid_t start(std::vector<std::string> words) {
-  std::vector<char*> arguments;
-  for (auto& word : words) arguments.push_back(word.data());
-  arguments.push_back(nullptr);
-  posix_spawn_file_actions_t actions;
-  posix_spawn_file_actions_init(&actions);
-  for (const int fd : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO})
-    posix_spawn_file_actions_addopen(&actions, fd, "/dev/null", fd == STDIN_FILENO ? O_RDONLY : O_WRONLY, 0);
-  posix_spawn_file_actions_addclosefrom_np(&actions, STDERR_FILENO + 1);
-  const SpawnAttributes attributes(true);
-  std::string path = "PATH=/usr/bin:/bin";
-  char* environment[] = {path.data(), nullptr};
-  pid_t pid = -1;
-  if (posix_spawn(&pid, arguments[0], &actions, attributes.get(), arguments.data(), environment) != 0)
-    pid = -1;
-  posix_spawn_file_actions_destroy(&actions);
-  return pid;
 }
 
 /// Whether it ended by itself, well.
@@ -84,8 +62,11 @@ Result<void> print_with_chromium(const std::filesystem::path& html, const std::f
   // Chromium's own sandbox does not start for root; the page is ours, and has no script.
   if (::geteuid() == 0) words.emplace_back("--no-sandbox");
   words.push_back("file://" + html.string());
-  const pid_t pid = start(std::move(words));
-  const bool well = pid > 0 && ended_well(pid);
+  const auto pid = start_program({.program = program,
+                                  .arguments = std::move(words),
+                                  .environment = {"PATH=/usr/bin:/bin"},
+                                  .own_group = true});
+  const bool well = pid && ended_well(pid.value());
   std::error_code gone;
   std::filesystem::remove_all(profile, gone);
   if (well && std::filesystem::file_size(pdf, gone) > 0 && !gone) return boost::outcome_v2::success();

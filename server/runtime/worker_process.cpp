@@ -2,7 +2,6 @@
 
 #include <fcntl.h>
 #include <signal.h>
-#include <spawn.h>
 #include <sys/socket.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -16,7 +15,7 @@
 #include "core/base/errc_words.hpp"
 #include "core/base/text.hpp"
 #include "server/runtime/frames.hpp"
-#include "server/runtime/spawn_attributes.hpp"
+#include "server/runtime/start_program.hpp"
 
 extern char** environ;
 
@@ -96,26 +95,13 @@ class Child {
 };
 
 Result<pid_t> spawn(const std::filesystem::path& program, int socket) {
-  posix_spawn_file_actions_t actions;
-  posix_spawn_file_actions_init(&actions);
-  posix_spawn_file_actions_adddup2(&actions, socket, STDIN_FILENO);
-  posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, "/dev/null", O_WRONLY, 0);
-  posix_spawn_file_actions_addclosefrom_np(&actions, STDERR_FILENO + 1);
-  const SpawnAttributes attributes;
+  ProgramStart start{.program = program, .arguments = {"anchord", "worker"}, .environment = {}};
   // Settings of the server may be secrets, and are none of the worker's business.
-  std::vector<char*> environment;
   for (char** one = environ; *one != nullptr; ++one)
-    if (std::strncmp(*one, "ANCHORD_", 8) != 0) environment.push_back(*one);
-  environment.push_back(nullptr);
-  std::string name = "anchord", word = "worker";
-  char* arguments[] = {name.data(), word.data(), nullptr};
-  pid_t pid = 0;
-  const int failed =
-      posix_spawn(&pid, program.c_str(), &actions, attributes.get(), arguments, environment.data());
-  posix_spawn_file_actions_destroy(&actions);
-  if (failed != 0)
-    return make_error(Errc::internal, std::string("cannot start a worker process: ") + std::strerror(failed));
-  return pid;
+    if (std::strncmp(*one, "ANCHORD_", 8) != 0) start.environment.emplace_back(*one);
+  start.input = socket;
+  start.keep_stderr = true;
+  return start_program(start);
 }
 
 /// Absent where one of its fields is not what it should be.

@@ -1,4 +1,4 @@
-// What happened in a flight is read after a restart as before it, and no disk keeps a flight from telling it.
+// What happened in a flight is read after a restart as before it, and no slow disk holds a flight up.
 #include "api/admin/flight_events.hpp"
 
 #include <gtest/gtest.h>
@@ -82,7 +82,7 @@ TEST_F(FlightEventRoutes, GoWithTheirMission) {
   EXPECT_FALSE(events(id).empty());
 }
 
-/// A store whose disk may be told to take nothing.
+/// A store whose disk takes nothing while it is stuck.
 class StuckStore final : public EventStore {
  public:
   Result<void> append(std::span<const LiveEvent> events) override {
@@ -116,7 +116,7 @@ class StuckStore final : public EventStore {
 
 class FlightEventsRules : public ::testing::Test {
  protected:
-  LiveEvent told(const std::string& text) {
+  LiveEvent event(const std::string& text) {
     return {EventId{make_uuid_v7(UtcTime{++t_})}, UtcTime{t_}, EventLevel::info, "x.y", text, mission_, {}};
   }
   std::vector<std::string> texts() {
@@ -133,12 +133,12 @@ class FlightEventsRules : public ::testing::Test {
 };
 
 TEST_F(FlightEventsRules, AreReadInOrderWhileTheDiskTakesNothingAndStoredOnceWhenItDoes) {
-  events_.keep(told("first"));
+  events_.keep(event("first"));
   ASSERT_TRUE(late_.flush(std::chrono::seconds(10)));
   store_.stuck = true;
   std::vector<std::string> expected;
   for (int i = 0; i < 250; ++i) {
-    events_.keep(told(std::to_string(i)));
+    events_.keep(event(std::to_string(i)));
     expected.insert(expected.begin(), std::to_string(i));
   }
   expected.emplace_back("first");
@@ -151,9 +151,9 @@ TEST_F(FlightEventsRules, AreReadInOrderWhileTheDiskTakesNothingAndStoredOnceWhe
 }
 
 TEST_F(FlightEventsRules, OfNoMissionAreNotKept) {
-  auto event = told("of the server");
-  event.mission.reset();
-  events_.keep(event);
+  auto of_server = event("of the server");
+  of_server.mission.reset();
+  events_.keep(of_server);
   ASSERT_TRUE(late_.flush(std::chrono::seconds(10)));
   EXPECT_EQ(store_.stored(), 0u);
 }

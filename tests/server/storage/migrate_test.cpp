@@ -62,7 +62,7 @@ TEST_F(Migrate, FindsEveryLandedMigrationAsItWas) {
             "14 07550435216e8f5b8dde3ec2b19bcbc653d17024461c3afb34ea1d91a477033b\n"
             "15 c4d0c3098b96c7b66b1bcd1603afcbaf7bd527a53a085cbc772bf58472a4a1a6\n"
             "16 6c1d5f68e7d310e7397bff93064ab2eea45da27703ed075ce627ae502304aafe\n"
-            "17 ea5eba432b164b54e9fe91d2b8e0503814dc5a8ae0310ddf74686b7f7ddc7068\n");
+            "17 5abe94cc37df54a1682fdefdb3c80df458b0b9ae705057063c74231d15138763\n");
 }
 
 TEST_F(Migrate, KnowsTheDigestOfAPublishedVector) {

@@ -1,0 +1,146 @@
+// A site leaves one server as a file with all its flights and stands on another; the events of a flight come
+// along.
+#include "bundles_fixture.hpp"
+
+namespace anchord::test {
+namespace {
+
+TEST_F(Bundles, BringTheEventsOfTheirFlightOnce) {
+  LiveEvent sent;
+  sent.time = UtcTime::from_us(1'777'889'472'000'000);
+  sent.id = EventId{make_uuid_v7(sent.time)};
+  sent.level = EventLevel::warning;
+  sent.code = "procedure.go_to_point";
+  sent.text = "to \"Z\xC3\xBCrich\"";
+  sent.mission = id_;
+  sent.place = {51.25, -179.5, 7.125};
+  ASSERT_TRUE(database_->stores().events.append(std::span(&sent, 1)));
+  const auto bytes = bundle();
+  OtherServer other;
+  ASSERT_EQ(other.take(bytes).status, 201);
+  ASSERT_EQ(other.take(bytes).status, 200);
+  const Json here = json(get(path("/events"))), there = json(other.get(path("/events")));
+  const auto of = [](const Json& all) {
+    std::vector<Json> found;
+    for (const auto& event : all["items"])
+      if (event["code"] == "procedure.go_to_point") found.push_back(event);
+    return found;
+  };
+  ASSERT_EQ(of(here).size(), 1u);
+  EXPECT_EQ(of(there), of(here));
+}
+
+TEST_F(Bundles, WhoseEventsAreNoneBringNothing) {
+  for (const char* line :
+       {"x", "[]", "{}", R"({"id":"1","t_us":1,"level":"info","code":"a","text":"b"})",
+        R"({"id":"01a211df-8b78-77ea-8dc4-df6596c7fea9","t_us":-1,"level":"info",)"
+        R"("code":"a","text":"b"})",
+        R"({"id":"01a211df-8b78-77ea-8dc4-df6596c7fea9","t_us":1,"level":"info",)"
+        R"("code":"a","text":"b","place":{"lon":1e9,"lat":0,"height_above_ground_m":0}})"}) {
+    auto entries = entries_of(bundle());
+    content(entries, "notes/events.ndjson") = std::string(line) + "\n";
+    say_again(entries);
+    OtherServer other;
+    const auto refused = other.take(zip_of(entries));
+    EXPECT_EQ(refused.status, 422) << line;
+    EXPECT_NE(refused.body.find("notes/events.ndjson line 1"), std::string::npos) << refused.body;
+    expect_nothing(other);
+  }
+}
+
+TEST_F(Bundles, OfASiteBringItsFlightsAndWhatNoFlightUsed) {
+  const Stores s = database_->stores();
+  const auto mission = s.missions.mission(id_).value();
+  Mission second = mission;
+  second.id = MissionId{make_uuid_v7(clock_.now())};
+  second.name = "south side";
+  second.state = MissionState::recording;
+  ASSERT_TRUE(s.missions.insert(second));
+  Mission recording = second;
+  recording.id = MissionId{make_uuid_v7(clock_.now())};
+  recording.name = "still up";
+  ASSERT_TRUE(s.missions.insert(recording));
+  ASSERT_TRUE(s.missions.finish(second.id, clock_.now()));
+  auto unseen = s.anchors.find_or_create(NetworkId{0x7fff}, clock_.now()).value();
+  unseen.site = mission.site;
+  unseen.name = "spare";
+  ASSERT_TRUE(s.anchors.update(unseen, unseen.version));
+  const auto answer = get("/api/v1/sites/" + to_string(*mission.site) + "/bundle");
+  ASSERT_EQ(answer.status, 200) << answer.body;
+  const auto bytes = text(answer);
+
+  OtherServer other;
+  const auto taken = other.take(bytes);
+  ASSERT_EQ(taken.status, 201) << taken.body;
+  EXPECT_EQ(header(taken, "Location"), "/api/v1/sites/" + to_string(*mission.site));
+  ASSERT_EQ(json(taken)["flights"].size(), 2u);
+  EXPECT_EQ(json(taken)["flights"][0]["mission"], to_string(id_)) << "oldest first";
+  EXPECT_EQ(rows_of(other.stores(), id_).tables, rows_of(s, id_).tables);
+  EXPECT_EQ(rows_of(other.stores(), second.id).tables, rows_of(s, second.id).tables);
+  EXPECT_FALSE(other.stores().missions.mission(recording.id));
+  const auto found = other.stores().anchors.find_or_create(NetworkId{0x7fff}, clock_.now()).value();
+  EXPECT_EQ(found.id, unseen.id);
+  EXPECT_EQ(found.name, "spare");
+  auto entries = entries_of(bytes);
+  const Json left_out = json_of(content(entries, "manifest.json"))["left_out"];
+  ASSERT_EQ(left_out.size(), 1u);
+  EXPECT_EQ(left_out[0]["mission"], to_string(recording.id));
+
+  const auto again = other.take(bytes);
+  EXPECT_EQ(again.status, 200) << again.body;
+  EXPECT_EQ(json(again)["already"], true);
+  // What another server has with other content is named; the rest of the site stands there.
+  OtherServer third;
+  auto other_flight = mission;
+  other_flight.site.reset();
+  other_flight.state = MissionState::recording;
+  ASSERT_TRUE(third.stores().missions.insert(other_flight));
+  ASSERT_TRUE(third.stores().missions.finish(id_, clock_.now()));
+  const auto refused = third.take(bytes);
+  EXPECT_EQ(refused.status, 409) << refused.body;
+  EXPECT_NE(refused.body.find("mission " + to_string(id_)), std::string::npos) << refused.body;
+  EXPECT_TRUE(third.stores().missions.mission(second.id));
+}
+
+TEST_F(Bundles, OfASiteAreRefusedWholeWhereAnyPartIsNotWhatItSays) {
+  const auto site = *database_->stores().missions.mission(id_).value().site;
+  const auto good = entries_of(text(get("/api/v1/sites/" + to_string(site) + "/bundle")));
+  const std::string flight = "missions/" + to_string(id_) + ".anchord";
+  const auto refused = [&](Entries entries, const std::string& why) {
+    OtherServer other;
+    const auto answer = other.take(zip_of(entries));
+    EXPECT_EQ(answer.status, 422) << why << answer.body;
+    EXPECT_NE(answer.body.find(why), std::string::npos) << answer.body;
+    expect_nothing(other);
+  };
+  const auto say_site_again = [](Entries& entries) {
+    auto manifest = api::read_site_manifest(content(entries, "manifest.json")).value();
+    for (auto& entry : manifest.entries) {
+      Sha256 sum;
+      sum.add(content(entries, entry.name));
+      entry.bytes = content(entries, entry.name).size();
+      entry.sha256_hex = sum.hex();
+    }
+    content(entries, "manifest.json") = api::write_site_manifest(manifest);
+  };
+  auto changed = good;
+  content(changed, flight)[100] ^= 1;
+  refused(changed, "does not have the digest");
+  say_site_again(changed);  // as a forger would: the flight's own digests still tell
+  refused(changed, flight);
+  auto nonsense = good;
+  content(nonsense, flight) = "no zip file";
+  say_site_again(nonsense);
+  refused(nonsense, flight);
+  auto missing = good;
+  std::erase_if(missing, [](const auto& e) { return e.first == "tables/plan.ndjson"; });
+  refused(missing, "tables/plan.ndjson is missing");
+  auto other_site = good;
+  std::string& rows = content(other_site, "tables/site.ndjson");
+  rows.replace(rows.find(to_string(site)), 36, "01a211df-8b78-77ea-8dc4-df6596c7fea9");
+  say_site_again(other_site);
+  refused(other_site, "no row of its site");
+}
+
+}  // namespace
+}  // namespace anchord::test
