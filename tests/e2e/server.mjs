@@ -35,7 +35,8 @@ for (const signal of ['SIGINT', 'SIGTERM', 'SIGHUP']) process.on(signal, () => p
  *   await server.dispose();                        // stops it and removes the folder
  */
 export class Server {
-  constructor({ auth = 'off', dataDir, args = [], env = {}, tls } = {}) {
+  constructor({ auth = 'off', dataDir, args = [], env = {}, tls, program = binary } = {}) {
+    this.program = program;
     this.auth = auth;
     this.ownsDataDir = !dataDir;
     this.dataDir = dataDir ?? mkdtempSync(join(tmpdir(), 'anchord e2e '));
@@ -65,7 +66,7 @@ export class Server {
     const listen = this.tls ? `http://${plain},127.0.0.1:${this.securePort ?? 0}` : plain;
     const args = ['serve', '--listen', listen, `--auth=${this.auth}`, '--data-dir', this.dataDir, ...this.args];
     if (this.tls) args.push('--tls-certificate', this.tls.certificate, '--tls-key', this.tls.key);
-    this.child = spawn(binary, args, { stdio: ['ignore', 'pipe', 'pipe'], env: { ...process.env, ...this.env } });
+    this.child = spawn(this.program, args, { stdio: ['ignore', 'pipe', 'pipe'], env: { ...process.env, ...this.env } });
     const child = this.child;
     running.add(child);
     child.once('exit', () => running.delete(child));
