@@ -102,6 +102,7 @@ void MissionService::State::schedule(const std::shared_ptr<Flight>& flight) {
   post(*flight->strand, [self = shared_from_this(), flight] {
     const auto ran = guarded("live path", [&] {
       if (!self->stopped) self->work(*flight);
+      if (!self->stopped && lacks_rows(*flight)) self->begin_anew(flight);
     });
     bool again = false;
     {
@@ -130,27 +131,37 @@ void MissionService::State::post(Executor& on, std::function<void()> task) {
   });
 }
 
-std::deque<flight::LiveRow> MissionService::State::take_rows(Flight& flight, std::uint64_t& dropped) {
+std::deque<flight::LiveRow> MissionService::State::take_rows(Flight& flight) {
   auto inbox = flight.inbox.lock();
   const auto n = static_cast<std::ptrdiff_t>(std::min(inbox->queue.size(), k_slice));
   std::deque<flight::LiveRow> rows(std::make_move_iterator(inbox->queue.begin()),
                                    std::make_move_iterator(inbox->queue.begin() + n));
   inbox->queue.erase(inbox->queue.begin(), inbox->queue.begin() + n);
-  dropped = std::exchange(inbox->dropped, 0);
   return rows;
 }
 
-void MissionService::State::work(Flight& flight) {
-  std::uint64_t dropped = 0;
-  auto rows = take_rows(flight, dropped);
-  queued -= rows.size();
-  if (dropped > 0) {
-    deps.events.add(EventLevel::warning, "live.behind",
-                    std::to_string(dropped) +
-                        " measurements were dropped from the live estimates because their queue was full; "
-                        "they are stored",
-                    flight.id);
+/// Once: a bulk import may be faster than the estimates for minutes.
+void MissionService::State::report_dropped(Flight& flight) const {
+  {
+    auto inbox = flight.inbox.lock();
+    if (inbox->dropped == 0 || std::exchange(inbox->behind_reported, true)) return;
   }
+  deps.events.add(
+      EventLevel::warning, "live.behind",
+      "measurements come faster than they are estimated from: the live estimates lack some; all are "
+      "stored, and are taken in once the flight is finished",
+      flight.id);
+}
+
+bool MissionService::State::lacks_rows(Flight& flight) {
+  const auto inbox = flight.inbox.lock();
+  return inbox->dropped > 0 && inbox->queue.empty() && inbox->mission.state == MissionState::finished;
+}
+
+void MissionService::State::work(Flight& flight) {
+  auto rows = take_rows(flight);
+  queued -= rows.size();
+  report_dropped(flight);
   auto work = flight.work.lock();
   if (flight.rebuilding) {
     // It begins anew: what was taken goes back to the head of the queue, and is worked off after what is

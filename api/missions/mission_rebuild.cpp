@@ -23,7 +23,33 @@ std::vector<Exclusion> MissionService::State::exclusions_of(const MissionId& id)
   return all ? std::move(all).value() : std::vector<Exclusion>{};
 }
 
+void MissionService::State::begin_anew(const std::shared_ptr<Flight>& flight) {
+  // Rows that come from here on wait in the queue until what is stored is in.
+  flight->rebuilding = true;
+  {
+    auto inbox = flight->inbox.lock();
+    inbox->ahead.forget();
+    inbox->dropped = 0;
+    inbox->behind_reported = false;
+  }
+  {
+    auto exclusions = exclusions_of(flight->id);
+    {
+      auto positions = flight->positions.lock();
+      positions->begin_anew(exclusions);
+    }
+    auto work = flight->work.lock();
+    work->live.begin_anew(std::move(exclusions));
+    work->rebuilt.clear();
+  }
+  begin_rebuild(flight);
+}
+
 void MissionService::State::begin_rebuild(const std::shared_ptr<Flight>& flight) {
+  {
+    auto inbox = flight->inbox.lock();
+    inbox->closing = inbox->mission.state == MissionState::finished;
+  }
   const auto n = deps.measurements.count_ranges(flight->id),
              fixes = deps.measurements.count_fixes(flight->id);
   if (!n || !fixes || n.value() + fixes.value() == 0) {

@@ -113,23 +113,7 @@ void MissionService::exclusions_changed(const MissionId& id) {
   state_->forget_reads(id);
   const auto flight = state_->find(id);
   if (!flight) return;
-  // Rows that come from here on wait in the queue until what is stored is in.
-  flight->rebuilding = true;
-  {
-    auto inbox = flight->inbox.lock();
-    inbox->ahead.forget();
-  }
-  {
-    auto exclusions = state_->exclusions_of(id);
-    {
-      auto positions = flight->positions.lock();
-      positions->begin_anew(exclusions);
-    }
-    auto work = flight->work.lock();
-    work->live.begin_anew(std::move(exclusions));
-    work->rebuilt.clear();
-  }
-  state_->begin_rebuild(flight);
+  state_->begin_anew(flight);
 }
 
 bool MissionService::wants_cir() const { return state_->deps.predict_needs_cir(); }

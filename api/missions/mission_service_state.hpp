@@ -51,7 +51,8 @@ struct MissionService::Flight {
     SteadyTime view_made{};
     bool scheduled{false};
     bool closing{false};  ///< finished, and what waits for a fix is not reported yet
-    std::uint64_t dropped{0};
+    std::uint64_t dropped{0};  ///< rows for which the queue had no room, since all that are stored were read
+    bool behind_reported{false};
     SteadyTime last_arrival{};
     SteadyTime used{};  ///< last by a sender or a reader
     /// Evicted: rows that found it before are in the store, where the next flight reads them.
@@ -153,7 +154,12 @@ struct MissionService::State : std::enable_shared_from_this<MissionService::Stat
   static void share_origin(Flight& flight, const Flight::Work& work);
   void schedule(const std::shared_ptr<Flight>& flight);
   void work(Flight& flight);
-  static std::deque<flight::LiveRow> take_rows(Flight& flight, std::uint64_t& dropped);
+  static std::deque<flight::LiveRow> take_rows(Flight& flight);
+  void report_dropped(Flight& flight) const;
+  /// Finished, all that waited worked off, and rows are missing: nothing in the air waits for it any more.
+  static bool lacks_rows(Flight& flight);
+  /// From what is stored, less what is excluded now.
+  void begin_anew(const std::shared_ptr<Flight>& flight);
   void make_view(Flight& flight, const Flight::Work& work) const;
   void note_radios(const flight::LiveRow& row, SteadyTime now);
   /// What the live mission reports, to the world: hub, event log, store, pilot.

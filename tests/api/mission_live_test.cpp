@@ -84,6 +84,33 @@ TEST_F(MissionLive, TakesRowsThatComeWhileItReadsWhatWasStored) {
   close();
 }
 
+/// An import is faster than the estimates: what its queue could not hold is read back, and nothing is warned
+/// of twice.
+TEST_F(MissionLive, HasEveryStoredRangeOnceFinishedThoughItsQueueOverflowed) {
+  const auto flight = streamed(MadeFlight{});
+  HeldExecutor later;
+  live_ = &later;
+  restart();
+  const auto id = mission("local");
+  while (later.run_one()) continue;
+  deliver(id, flight, 0, 120.5);
+  std::string others;
+  for (std::size_t i = 0; i < 100'000; ++i)  // as many as wait at most
+    others += R"({"tag":"0x6e01","anchor":"0x6fff","distance_m":9,"seq":)" + std::to_string(i) +
+              R"(,"t_us":)" + std::to_string(k_start_us + 200'000'000 + static_cast<std::int64_t>(i)) + "}\n";
+  ASSERT_EQ(post("/api/v1/ranges", others, "application/x-ndjson", {{"mission", id}}).status, 200);
+  ASSERT_EQ(post("/api/v1/missions/" + id + "/actions", R"({"action":"finish"})").status, 200);
+  while (later.run_one()) continue;
+  std::size_t n = 0;
+  for (const auto& [anchor, properties] : live(id))
+    n += properties["quality"]["n_ranges"].get<std::size_t>() +
+         properties["quality"]["n_refused"].get<std::size_t>();
+  EXPECT_EQ(n, flight.ranges.size() + 100'000);
+  const auto events = json(get("/api/v1/missions/" + id + "/events"))["items"];
+  EXPECT_EQ(std::ranges::count_if(events, [](const Json& e) { return e["code"] == "live.behind"; }), 1);
+  close();
+}
+
 /// Nobody looks for a fix behind the last one any more: no range is left without a word.
 TEST_F(MissionLive, TellsOfEveryRangeOnceTheFlightIsFinished) {
   auto flight = streamed(MadeFlight{});

@@ -1,6 +1,15 @@
 import { describe, expect, it } from 'vitest';
 import { estimate, type MissionMsg, type RangeMsg } from '../src/live/messages';
-import { after, marks_of, neighbour, Player, poses_of, range_of, type Recording } from '../src/state/recording';
+import {
+  after,
+  marks_of,
+  neighbour,
+  Player,
+  poses_of,
+  range_of,
+  span_of,
+  type Recording,
+} from '../src/state/recording';
 
 const mission: MissionMsg = {
   mission: 'm',
@@ -45,6 +54,17 @@ const recording: Recording = {
   marks: [],
   cut: false,
 };
+
+describe('the span of a recording', () => {
+  const at = (...t_s: number[]) => t_s.map((t) => ({ t_us: t * 1e6 }));
+  it('is that of positions and ranges together', () => {
+    expect(span_of(at(1, 100), at(3, 120), false)).toEqual({ from_us: 1e6, to_us: 120e6 });
+    expect(span_of([], at(3, 120), false)).toEqual({ from_us: 3e6, to_us: 120e6 });
+  });
+  it('ends, where not all was read, before one of the two falls silent', () => {
+    expect(span_of(at(1, 100), at(3, 60), true)).toEqual({ from_us: 1e6, to_us: 60e6 });
+  });
+});
 
 describe('the player of a recording', () => {
   it('shows what was known at a moment and nothing later', () => {

@@ -32,6 +32,9 @@ export interface Mark {
   readonly text: string;
   readonly place: Lonlat | null; ///< where the aircraft is sent by it
 }
+interface Timed {
+  readonly t_us: number;
+}
 export interface Recording {
   readonly mission: MissionMsg;
   readonly from_us: number;
@@ -43,7 +46,7 @@ export interface Recording {
 }
 
 const PAGE = 10_000,
-  PAGES_MAX = 12; ///< 120 000 rows of each: three hours at 10 Hz; more is said to be cut
+  PAGES_MAX = 60; ///< 600 000 rows of each: three hours at 55 Hz, some 200 MB of the browser; what is longer is played up to there
 
 interface Page<Row> {
   readonly items?: readonly Unchecked<Row>[] | null;
@@ -53,15 +56,18 @@ async function pages<Row, T>(
   page: (query: { mission: string; limit: number; cursor?: string }) => Promise<Page<Row> | null>,
   mission: string,
   of: (row: Unchecked<Row>) => T | null,
+  read: (n_rows: number) => void,
 ): Promise<{ rows: T[]; cut: boolean }> {
   const rows: T[] = [];
   let cursor = '';
   for (let i = 0; i < PAGES_MAX; i++) {
     const answer = await page({ mission, limit: PAGE, ...(cursor ? { cursor } : {}) });
-    for (const o of elements(answer?.items)) {
+    const items = elements(answer?.items);
+    for (const o of items) {
       const row = of(o);
       if (row) rows.push(row);
     }
+    read(items.length);
     cursor = str(answer?.next_cursor);
     if (!cursor) return { rows, cut: false };
   }
@@ -152,39 +158,46 @@ export const marks_of = (
     .filter((e) => e.t_us >= from_us && e.t_us <= to_us)
     .sort((a, b) => a.t_us - b.t_us);
 
-export async function load_recording(mission: MissionMsg): Promise<Recording> {
+/// Where not all is read, it ends where either of the two does: beyond it the other would look like a tag or receiver that fell silent.
+export function span_of(
+  poses: readonly Timed[],
+  ranges: readonly Timed[],
+  cut: boolean,
+): { from_us: number; to_us: number } {
+  const both = [poses, ranges].filter((rows) => rows.length > 0),
+    ends = both.map((rows) => rows[rows.length - 1]!.t_us);
+  return {
+    from_us: Math.min(...both.map((rows) => rows[0]!.t_us)),
+    to_us: cut ? Math.min(...ends) : Math.max(...ends),
+  };
+}
+
+/// `read` gets the number of rows that have come so far.
+export async function load_recording(mission: MissionMsg, read: (n_rows: number) => void): Promise<Recording> {
   const of = mission.mission;
+  let n_rows = 0;
+  const more = (n: number): void => read((n_rows += n));
   const [fixes, ranges, events] = await Promise.all([
     pages(
       (query) => get('/fixes', { query }),
       of,
       (row) => row,
+      more,
     ),
-    pages((query) => get('/ranges', { query: { ...query, predicted: true } }), of, range_of(of)),
+    pages((query) => get('/ranges', { query: { ...query, predicted: true } }), of, range_of(of), more),
     pages(
       ({ cursor }) =>
         get('/missions/{id}/events', { path: { id: of }, query: { limit: 1000, ...(cursor ? { cursor } : {}) } }),
       of,
       (row) => row,
+      () => undefined,
     ).catch(() => ({ rows: [] })),
   ]);
-  const poses = poses_of(fixes.rows, mission.mission, mission.origin),
-    by_time = (a: { t_us: number }, b: { t_us: number }): number => a.t_us - b.t_us;
-  const times = [
-    poses[0]?.t_us,
-    poses[poses.length - 1]?.t_us,
-    ranges.rows[0]?.t_us,
-    ranges.rows[ranges.rows.length - 1]?.t_us,
-  ].filter((t) => t !== undefined);
-  return {
-    mission,
-    from_us: Math.min(...times),
-    to_us: Math.max(...times),
-    poses: poses.sort(by_time),
-    ranges: ranges.rows.sort(by_time),
-    cut: fixes.cut || ranges.cut,
-    marks: marks_of(events.rows, Math.min(...times), Math.max(...times)),
-  };
+  const by_time = (a: Timed, b: Timed): number => a.t_us - b.t_us,
+    poses = poses_of(fixes.rows, mission.mission, mission.origin).sort(by_time),
+    cut = fixes.cut || ranges.cut,
+    span = span_of(poses, ranges.rows.sort(by_time), cut);
+  return { mission, ...span, poses, ranges: ranges.rows, cut, marks: marks_of(events.rows, span.from_us, span.to_us) };
 }
 
 /// What was estimated when, in the order of time: the server computes it from the stored rows, which takes seconds for a long flight.
@@ -197,7 +210,7 @@ export async function estimates_over_time(mission: string): Promise<EstimateMsg[
 }
 
 /// First index whose time is above t.
-export function after(rows: readonly { readonly t_us: number }[], t_us: number): number {
+export function after(rows: readonly Timed[], t_us: number): number {
   let [lo, hi] = [0, rows.length];
   while (lo < hi) {
     const mid = (lo + hi) >> 1;
@@ -208,11 +221,7 @@ export function after(rows: readonly { readonly t_us: number }[], t_us: number):
 }
 
 /// The event after a moment, or before it; null where there is none. Several of one moment are one step.
-export function neighbour<T extends { readonly t_us: number }>(
-  marks: readonly T[],
-  t_us: number,
-  by: 1 | -1,
-): T | null {
+export function neighbour<T extends Timed>(marks: readonly T[], t_us: number, by: 1 | -1): T | null {
   const next = after(marks, t_us);
   if (by === 1) return marks[next] ?? null;
   for (let i = next - 1; i >= 0; i--) if (marks[i]!.t_us < t_us) return marks[i]!;

@@ -23,7 +23,7 @@ import {
   link,
 } from '../../state/store';
 import { may } from '../../state/session';
-import { clock, fixed, told_apart } from '../../ui/format';
+import { clock, fixed, grouped, told_apart } from '../../ui/format';
 import { AlarmRow } from '../../ui/alarm_row';
 import { Chip } from '../../ui/marks';
 import { AnchorCard } from '../anchor_card';
@@ -46,6 +46,7 @@ export function Replay({ id }: { id: string | null }) {
     [attempt, set_attempt] = useState(0),
     [speed, set_speed] = useState<number>(1),
     [moment, set_moment] = useState<'asked' | 'moment' | 'whole'>('asked'),
+    [n_read, set_n_read] = useState(0),
     [, redraw] = useState(0);
   const wanted = (id ?? '').split('?')[0] || mission_id.value,
     mission = ordered_missions.value.find((m) => m.mission === wanted) ?? null;
@@ -62,7 +63,8 @@ export function Replay({ id }: { id: string | null }) {
     let gone = false;
     // From the first moment nothing here is of now: while the flight is read, its scene is empty.
     replayed.value = { scene: new Scene(mission.mission), mission: { ...mission, state: 'recording' }, at_s };
-    load_recording(mission).then(
+    set_n_read(0);
+    load_recording(mission, (n_rows) => !gone && set_n_read(n_rows)).then(
       async (recording) => {
         const made = new Player(recording);
         if (gone) return;
@@ -213,7 +215,9 @@ export function Replay({ id }: { id: string | null }) {
           </select>
         )}
         <span class="grow" />
-        {r?.cut && <span class="mut">Only the first 120 000 rows are played.</span>}
+        {r?.cut && (
+          <span class="mut">Played to {clock((r.to_us - r.from_us) / 1e6)}: the flight has more rows than that.</span>
+        )}
         <a class="btn" href="#/live">
           Back to live
         </a>
@@ -246,7 +250,7 @@ export function Replay({ id }: { id: string | null }) {
           ) : (
             !failed && (
               <p class="why pad" role="status">
-                The flight is being read.
+                The flight is being read{n_read > 0 && `: ${grouped(n_read)} rows so far`}.
               </p>
             )
           )}

@@ -2,6 +2,7 @@
 /// measures: a tag that talks and gives no range is as bad as one that is unplugged. No DOM.
 import type { Device } from '../../api/devices';
 import type { Shape, Tone } from '../../ui/marks';
+import { grouped } from '../../ui/format';
 
 export interface Standing {
   readonly shape: Shape;
@@ -430,10 +431,9 @@ export function doing(d: Device): string {
     ]
       .filter(Boolean)
       .join(', ');
-  if (of_ranges(d))
-    return d.counters.ranges ? `${d.counters.ranges.toLocaleString('en').replaceAll(',', ' ')} ranges` : '';
+  if (of_ranges(d)) return d.counters.ranges ? `${grouped(d.counters.ranges)} ranges` : '';
   return d.kind === 'ntrip' && d.counters.frames
-    ? `${d.counters.frames.toLocaleString('en').replaceAll(',', ' ')} correction${d.counters.frames === 1 ? '' : 's'}`
+    ? `${grouped(d.counters.frames)} correction${d.counters.frames === 1 ? '' : 's'}`
     : '';
 }
 /// For the line above the table.
