@@ -90,7 +90,7 @@ test('nothing of the running flight is shown as a replay while the stored one is
     await route.continue();
   });
   await page.goto(`${server.url}/#/replay/${mission}`);
-  await page.getByText('The flight is being read.').waitFor({ timeout: 20_000 });
+  await page.getByText('The flight is being read').waitFor({ timeout: 20_000 });
   await eventually(
     'the strip says REPLAY',
     async () => /REPLAY/.test(await text(page.getByTestId('status-link'))),
@@ -106,6 +106,29 @@ test('nothing of the running flight is shown as a replay while the stored one is
   );
   go_on();
   await page.getByTestId('range-list').waitFor({ timeout: 20_000 });
+  await page.close();
+});
+
+test('a flight without measurements says so, and nothing of the flight played before is left', async () => {
+  const none = await (
+    await server.fetch('/api/v1/missions', {
+      json: {
+        name: 'nothing came',
+        frame: 'wgs84',
+        track_point: 'gnss_antenna',
+        tags: [{ tag: '0x6e01', antenna: 0, lever_arm_body_m: [0, 0, 0] }],
+      },
+    })
+  ).json();
+  const { page, id } = await opened();
+  await id('play').click();
+  await page.getByLabel('Flight to replay').selectOption(none.id);
+  await page.getByText('This flight has no measurements: there is nothing to play.').waitFor({ timeout: 20_000 });
+  assert.ok(await id('play').isDisabled());
+  assert.equal(await id('range-list').count(), 0, 'no range of the other flight');
+  assert.equal(await text(id('replay-time')), '–');
+  await page.getByLabel('Flight to replay').selectOption(mission);
+  await eventually('the first is played again', () => id('range-list').isVisible(), 20_000);
   await page.close();
 });
 

@@ -166,6 +166,7 @@ export function span_of(
 ): { from_us: number; to_us: number } {
   const both = [poses, ranges].filter((rows) => rows.length > 0),
     ends = both.map((rows) => rows[rows.length - 1]!.t_us);
+  if (!both.length) return { from_us: 0, to_us: 0 };
   return {
     from_us: Math.min(...both.map((rows) => rows[0]!.t_us)),
     to_us: cut ? Math.min(...ends) : Math.max(...ends),

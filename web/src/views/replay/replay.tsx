@@ -45,7 +45,7 @@ export function Replay({ id }: { id: string | null }) {
     [playing, set_playing] = useState(false),
     [attempt, set_attempt] = useState(0),
     [speed, set_speed] = useState<number>(1),
-    [moment, set_moment] = useState<'asked' | 'moment' | 'whole'>('asked'),
+    [moment, set_moment] = useState<'asked' | 'moment' | 'whole' | 'nothing'>('asked'),
     [n_read, set_n_read] = useState(0),
     [, redraw] = useState(0);
   const wanted = (id ?? '').split('?')[0] || mission_id.value,
@@ -63,12 +63,17 @@ export function Replay({ id }: { id: string | null }) {
     let gone = false;
     // From the first moment nothing here is of now: while the flight is read, its scene is empty.
     replayed.value = { scene: new Scene(mission.mission), mission: { ...mission, state: 'recording' }, at_s };
+    // Nor of the flight that was played before.
+    set_player(null);
+    set_playing(false);
+    set_moment('asked');
     set_n_read(0);
     load_recording(mission, (n_rows) => !gone && set_n_read(n_rows)).then(
       async (recording) => {
         const made = new Player(recording);
         if (gone) return;
         set_problem('');
+        if (!recording.poses.length && !recording.ranges.length) return set_moment('nothing');
         made.to(recording.from_us + at_s * 1e6, now_ms());
         show(made);
         set_player(made);
@@ -247,6 +252,10 @@ export function Replay({ id }: { id: string | null }) {
           {player && <Then player={player} />}
           {player ? (
             <RangeList selected={selected} />
+          ) : moment === 'nothing' ? (
+            <p class="why pad" role="status">
+              This flight has no measurements: there is nothing to play.
+            </p>
           ) : (
             !failed && (
               <p class="why pad" role="status">
