@@ -94,6 +94,27 @@ Result<std::unique_ptr<Driver>> make_caster_client(const Json& options, std::str
   return std::unique_ptr<Driver>(std::make_unique<ntrip::Client>(std::move(client), output));
 }
 
+/// Of a driver that is made to see whether it can be.
+class Unheard final : public DriverOutput {
+ public:
+  void send(std::string_view) override {}
+  void emit(Fix) override {}
+  void emit(Range) override {}
+  void rover(const RoverStatus&) override {}
+  void identified(const Identity&) override {}
+  void heard() override {}
+  void dropped(std::string_view, std::uint64_t) override {}
+  void answer(std::uint64_t, Result<std::string>) override {}
+  void corrections(std::string_view) override {}
+  void hang_up(std::string_view, std::int64_t) override {}
+  std::optional<RoverStatus> rover_position() const override { return std::nullopt; }
+  timing::TimeBase& time() override { return time_; }
+  std::uint16_t slot() const override { return 0; }
+
+ private:
+  timing::TimeBase time_;
+};
+
 }  // namespace
 
 Result<std::unique_ptr<Driver>> make_driver(const Settings& settings, DriverOutput& output) {
@@ -110,6 +131,13 @@ Result<std::unique_ptr<Driver>> make_driver(const Settings& settings, DriverOutp
     return mapping::make_ndjson(options_json, where && where.value().kind == link::Kind::udp, output);
   }
   return make_error(Errc::invalid_argument, "kind: no driver for \"" + kind + "\"");
+}
+
+Result<void> check_settings(const Settings& settings) {
+  BOOST_OUTCOME_TRYV(link::parse_address(settings.address));
+  Unheard output;
+  BOOST_OUTCOME_TRYV(make_driver(settings, output));
+  return boost::outcome_v2::success();
 }
 
 }  // namespace anchord::device

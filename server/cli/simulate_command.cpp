@@ -59,7 +59,14 @@ void add_simulate_command(CLI::App& app, int& exit_code) {
   command->require_subcommand(0, 1);
   auto devices = std::make_shared<SimulateDevices>();
   command->add_option("SCENARIO", devices->scenario,
-                      "Scenario file (docs/formats.md), or demonstration: a tag on a pty, a rover on TCP");
+                      "Scenario file (docs/formats.md), or demonstration: a tag on a pty, a rover on TCP")
+      // Here and not when it is read: a slip in the name of a command is then recognized as one.
+      ->check([](const std::string& file) {
+        std::error_code ignored;
+        return file == "demonstration" || std::filesystem::exists(file, ignored)
+                   ? std::string()
+                   : file + ": there is no such file; \"demonstration\" is built in";
+      });
   command->add_flag("--json", devices->json,
                     "Print one JSON object per device and line, again after each plug");
   command->add_option("--seed", devices->seed, "Seed, instead of that of the scenario");

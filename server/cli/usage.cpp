@@ -2,9 +2,11 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <filesystem>
 #include <numeric>
 #include <optional>
 #include <string_view>
+#include <system_error>
 #include <vector>
 
 namespace anchord::cli {
@@ -86,8 +88,13 @@ std::string unknown_word(const CLI::App& app, std::span<const char* const> argum
     }
     const bool takes_words =
         std::ranges::any_of(at->get_options(), [](const auto* o) { return o->get_positional(); });
-    if (takes_words) continue;
-    return wrong("command", word, command, command_names(*at));
+    // A slip in a command is no file: "simulate flihgt".
+    const auto commands = command_names(*at);
+    std::error_code ignored;
+    const bool names_a_file =
+        word.find_first_of("./") != std::string::npos || std::filesystem::exists(word, ignored);
+    if (takes_words && (names_a_file || !nearest(word, commands))) continue;
+    return wrong("command", word, command, commands);
   }
   return {};
 }

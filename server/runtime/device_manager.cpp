@@ -234,13 +234,24 @@ class DeviceManager::Impl final : public device::DeviceListener {
     answers->waiting.erase(found);
   }
 
+  device::Settings settings_of(const DeviceConfig& config) {
+    return {to_string(config.id), config.kind, config.name, config.address, secrets_.driver_options(config)};
+  }
+
+  /// What is switched off is started one day, without whoever set it up: it is refused now or never.
+  Result<void> check(const DeviceConfig& config) {
+    Result<void> sound = boost::outcome_v2::success();
+    const auto ran = guarded("check of device \"" + config.name + '"',
+                             [&] { sound = device::check_settings(settings_of(config)); });
+    return ran ? sound : make_error(Errc::invalid_argument, "its settings cannot be used: " + ran.what);
+  }
+
   Result<void> begin(const DeviceConfig& config) {
     if (!loop_) return make_error(Errc::canceled, "the server is stopping");
     Result<void> begun = boost::outcome_v2::success();
     const auto ran = guarded("start of device \"" + config.name + '"', [&] {
       if (!recorder_) open_recorder();
-      begun = loop_->add(
-          {to_string(config.id), config.kind, config.name, config.address, secrets_.driver_options(config)});
+      begun = loop_->add(settings_of(config));
     });
     return ran ? begun : make_error(Errc::internal, "its settings cannot be used: " + ran.what);
   }
@@ -382,6 +393,10 @@ Result<DeviceReport> DeviceManager::add(DeviceConfig config) {
   BOOST_OUTCOME_TRY(const auto secret, DeviceSecrets::split(std::move(config), nullptr));
   config = secret.config;
   BOOST_OUTCOME_TRYV(impl_->secrets_.store(secret));
+  if (const auto sound = impl_->check(config); !sound) {
+    impl_->secrets_.forget(config.id);
+    return sound.error();
+  }
   {
     auto kept = impl_->kept_.lock();
     kept->devices.push_back({config, {}, {}});
@@ -419,12 +434,17 @@ Result<DeviceReport> DeviceManager::change(DeviceConfig config, std::uint64_t ex
   const auto& before = kept.config;
   const auto password = impl_->secrets_.kept(before.id);
   const auto stored = impl_->secrets_.store(secret);
-  const bool same_link = !secret.given && kept.problem.empty() && before.kind == config.kind &&
-                         before.address == config.address && before.options == config.options &&
-                         before.name == config.name && before.enabled == config.enabled;
+  const bool same_settings = !secret.given && before.kind == config.kind &&
+                             before.address == config.address && before.options == config.options,
+             same_link = same_settings && kept.problem.empty() && before.name == config.name &&
+                         before.enabled == config.enabled;
   if (!same_link) {
     const auto changed = impl_->on_io([&]() -> Result<void> {
       if (!stored) return stored.error();
+      // What is wrong since long may still be switched off.
+      if (config.enabled || !same_settings) {
+        BOOST_OUTCOME_TRYV(impl_->check(config));
+      }
       if (!impl_->loop_) return make_error(Errc::canceled, "the server is stopping");
       (void)impl_->loop_->remove(to_string(config.id));
       if (!config.enabled) return boost::outcome_v2::success();

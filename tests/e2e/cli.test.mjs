@@ -26,6 +26,7 @@ test('a command or option that does not exist ends with 2 and names the nearest 
   for (const [args, said] of [
     [['fly-me-to-the-moon'], /there is no command 'fly-me-to-the-moon'\n/],
     [['sovle', 'folder'], /there is no command 'sovle'; did you mean 'solve'\?/],
+    [['simulate', 'flihgt'], /there is no command 'flihgt' of simulate; did you mean 'flight'\?/],
     [['token', 'lst'], /there is no command 'lst' of token; did you mean 'list'\?/],
     [['serve', '--lisen', '127.0.0.1:1'], /there is no option '--lisen' of serve; did you mean '--listen'\?/],
     [['solve', 'folder', '--dim=2'], /there is no option '--dim' of solve; did you mean '--dims'\?/],

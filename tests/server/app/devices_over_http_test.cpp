@@ -66,6 +66,11 @@ TEST(DevicesOverHttp, RefusesWhatNoDriverTakesAndTheSameAddressTwice) {
         Json{{"kind", "pozyx"}, {"address", "tcp://127.0.0.1:1"}, {"options", {{"cir", "x"}}}}}) {
     server.ask("POST", "/api/v1/devices", body);
     EXPECT_EQ(server.last.status, 422) << body << server.last.body;
+    // Switched off it would be found out by whoever switches it on, in the field.
+    Json off = body;
+    off["enabled"] = false;
+    server.ask("POST", "/api/v1/devices", off);
+    EXPECT_EQ(server.last.status, 422) << off << server.last.body;
   }
   const Json good{{"kind", "gnss"}, {"address", "serial:/dev/serial/by-id/nothing"}};
   const auto made = server.ask("POST", "/api/v1/devices", good);
