@@ -239,6 +239,7 @@ void Application::State::add_routes() {
       [this](const Route& route, const Request& request) { return run_bound(route, request); });
   add_mission_routes(router, mission_api);
   add_mission_bin_routes(router, mission_api);
+  add_mission_correct_routes(router, mission_api);
   add_measurement_routes(router, measurement_api);
   add_site_routes(router, anchor_api);
   add_anchor_routes(router, anchor_api);

@@ -78,9 +78,7 @@ Response remove(MissionApi& s, const Request& request) {
   if (query_flag(request, "purge")) return purge(s, request, id);
   const Mission mission = named_mission(s, request);
   refuse_in_use(s, mission);
-  const auto seen = mission_answer(s, 200, mission);
-  const auto etag = std::ranges::find(seen.headers, "ETag", [](const auto& h) { return h.first; });
-  require_match(request, etag->second);
+  require_match(request, etag_of(mission_answer(s, 200, mission)));
   if (!request.principal.has(Role::admin))
     require_control(s, request, id, std::string(request.header("anchord-lease")),
                     "deleting a mission needs the role admin, or control of it with its lease in the header "

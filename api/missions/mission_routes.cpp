@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <nlohmann/json.hpp>
 
 #include "api/admin/event_log.hpp"
@@ -267,6 +268,10 @@ Response mission_answer(MissionApi& s, int status, const Mission& mission) {
   Response response = json_response(status, body);
   response.header("ETag", content_tag(response.body, "m-"));
   return response;
+}
+
+std::string etag_of(const Response& mission_answer) {
+  return std::ranges::find(mission_answer.headers, "ETag", [](const auto& h) { return h.first; })->second;
 }
 
 void add_mission_routes(Router& router, MissionApi& s) {

@@ -67,6 +67,19 @@ Result<Mission> MissionService::finish(const MissionId& id) {
   return current;
 }
 
+Result<Mission> MissionService::correct(const MissionId& id,
+                                        const std::function<Mission(const Mission&)>& edit) {
+  const std::scoped_lock one_at_a_time(state_->correcting_one);
+  BOOST_OUTCOME_TRY(const auto before, state_->deps.missions.mission(id));
+  const Mission after = edit(before);
+  if (before.state != MissionState::finished)
+    return make_error(Errc::conflict, before.name + " is recording: it can be corrected once it is finished");
+  BOOST_OUTCOME_TRYV(state_->deps.missions.update(after));
+  forget(id);
+  prepare(id);
+  return after;
+}
+
 void MissionService::forget(const MissionId& id) {
   state_->forget_reads(id);
   std::shared_ptr<Flight> gone;  // ends without the lock

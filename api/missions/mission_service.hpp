@@ -88,6 +88,9 @@ class MissionService {
   Result<void> create(const Mission& mission);
   /// conflict when it is finished already.
   Result<Mission> finish(const MissionId& id);
+  /// What was declared of a finished mission is corrected: `edit` gets it as it is stored, one correction at
+  /// a time, and may throw. Its estimates are computed anew. conflict while it records.
+  Result<Mission> correct(const MissionId& id, const std::function<Mission(const Mission&)>& edit);
   /// It was deleted: nothing of it is followed, shown or cached any more.
   void forget(const MissionId& id);
 

@@ -50,7 +50,7 @@ struct MissionService::Flight {
     std::optional<LiveView> view;
     SteadyTime view_made{};
     bool scheduled{false};
-    bool closing{false};  ///< finished, and what waits for a fix is not reported yet
+    bool closing{false};       ///< finished, and what waits for a fix is not reported yet
     std::uint64_t dropped{0};  ///< rows for which the queue had no room, since all that are stored were read
     bool behind_reported{false};
     SteadyTime last_arrival{};
@@ -109,6 +109,7 @@ struct MissionService::State : std::enable_shared_from_this<MissionService::Stat
     SteadyTime made{};
     LiveView view;
   };
+  std::mutex correcting_one;
   std::mutex reading_one;          ///< one flight is read at a time: each takes the memory of a live one
   Locked<std::deque<Read>> reads;  ///< newest last
   /// What a flight estimated over time, as the body that tells it.

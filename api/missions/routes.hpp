@@ -64,11 +64,13 @@ struct MissionApi {
 Mission named_mission(MissionApi& api, const Request& request);
 /// With its ETag, which covers all that the body says.
 Response mission_answer(MissionApi& api, int status, const Mission& mission);
+std::string etag_of(const Response& mission_answer);
 /// 409 no-control unless the request names the lease of this mission's control.
 void require_control(MissionApi& api, const Request& request, const MissionId& mission,
                      const std::string& lease, const std::string& what);
 
 void add_mission_routes(Router& router, MissionApi& api);
 void add_mission_bin_routes(Router& router, MissionApi& api);
+void add_mission_correct_routes(Router& router, MissionApi& api);
 
 }  // namespace anchord::api

@@ -14,6 +14,7 @@ constexpr auto k_routes = std::to_array<RouteSites>({
     {get, "/api/v1/missions", stored},
     {post, "/api/v1/missions", stored},
     {get, "/api/v1/missions/{id}", mission},
+    {patch, "/api/v1/missions/{id}", mission},
     {del, "/api/v1/missions/{id}", mission},
     {post, "/api/v1/missions/{id}/restore", mission},
     {get, "/api/v1/missions/{id}/bundle", refused},

@@ -114,7 +114,8 @@ struct Settings {
 
 /// The drivers there are. errors: invalid_argument, naming the option.
 Result<std::unique_ptr<Driver>> make_driver(const Settings& settings, DriverOutput& output);
-/// Whether it could be started: its kind, address and options. errors: invalid_argument, naming what is wrong.
+/// Whether it could be started: its kind, address and options. errors: invalid_argument, naming what is
+/// wrong.
 Result<void> check_settings(const Settings& settings);
 
 }  // namespace anchord::device

@@ -58,8 +58,9 @@ void add_simulate_command(CLI::App& app, int& exit_code) {
       "simulate", "Provide simulated devices on ptys and TCP ports, or generate a flight without a drone");
   command->require_subcommand(0, 1);
   auto devices = std::make_shared<SimulateDevices>();
-  command->add_option("SCENARIO", devices->scenario,
-                      "Scenario file (docs/formats.md), or demonstration: a tag on a pty, a rover on TCP")
+  command
+      ->add_option("SCENARIO", devices->scenario,
+                   "Scenario file (docs/formats.md), or demonstration: a tag on a pty, a rover on TCP")
       // Here and not when it is read: a slip in the name of a command is then recognized as one.
       ->check([](const std::string& file) {
         std::error_code ignored;
