@@ -431,6 +431,29 @@ test('system tells the state of the server, and a token is shown once', async ()
   await page.close();
 });
 
+test('a wrong name and lever arm of a stored flight are corrected, and everything else of it stays', async () => {
+  const of_api = async () => (await (await server.fetch('/api/v1/missions')).json()).items.at(-1);
+  const before = await of_api();
+  const { page, seen, id } = await openPage(browser, server, { hash: '#/system' });
+  await id('correct-flight').last().click();
+  const form = id('flight-form');
+  assert.ok(await form.getByTestId('flight-correct').isDisabled(), 'nothing is wrong yet');
+  await form.getByLabel('Name').fill('North hall');
+  await form.getByLabel(`${before.tags[0].tag} Up, m`).fill('x');
+  await form.getByText('Lever arms are numbers in metres.').waitFor();
+  await form.getByLabel(`${before.tags[0].tag} Up, m`).fill('-0,31');
+  assert.deepEqual(await violations(page, { within: '[data-testid="flight-form"]' }), []);
+  await form.getByTestId('flight-correct').click();
+  await form.waitFor({ state: 'detached' });
+  await eventually('the list has the new name', async () => (await text(id('flights'))).includes('North hall'), 10_000);
+  const now = await of_api();
+  assert.deepEqual(now.tags[0].lever_arm_body_m, [...before.tags[0].lever_arm_body_m.slice(0, 2), -0.31]);
+  for (const key of ['id', 'kit', 'frame', 'track_point', 'state', 'created_at', 'n_ranges', 'n_fixes'])
+    assert.deepEqual(now[key], before[key], key);
+  assert.deepEqual(seen.errors, []);
+  await page.close();
+});
+
 test('a stored flight is replayed: time moves, a jump shows that moment, and no command is offered', async () => {
   const { page, seen, id } = await openPage(browser, server, { hash: '#/replay' });
   await eventually('the flight is read', async () => /\d/.test(await text(id('replay-time'))), 20_000);

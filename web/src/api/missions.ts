@@ -23,6 +23,12 @@ export async function delete_flight(id: string, admin: boolean): Promise<void> {
     throw e;
   }
 }
+export type Correction = Wire<'MissionCorrection'>;
+/// Of what was declared when it began. What the body leaves out stays, whoever corrected it meanwhile.
+export async function correct_flight(id: string, body: Correction): Promise<void> {
+  const { etag } = await call('get', '/missions/{id}', at(id));
+  await call('patch', '/missions/{id}', { ...at(id), body, headers: { 'If-Match': etag } });
+}
 export const restore_flight = (id: string): Promise<unknown> =>
   call('post', '/missions/{id}/restore', { ...at(id), headers: { 'Idempotency-Key': idempotency_key() } });
 

@@ -84,7 +84,7 @@ export const PAGES: readonly Page[] = [
           "Measure from the middle of the GNSS antenna's phase centre (its label gives the height above the mount) to the middle of the tag's antenna.",
           'Forward and left are positive; below the antenna is negative. Example: 12 cm ahead, 28 cm below is 0.12, 0, −0.28.',
           'State the accuracy: one sigma of the forward and left part. With a tape measure 0.02 m; by eye 0.05 m; from the drawing of the mount 0.005 m.',
-          'Give both with the flight: tags and lever_arm_sigma_m of POST /missions or of flight.json, or in Import a flight. System, Lever arms, shows them.',
+          'Give both with the flight: tags and lever_arm_sigma_m of POST /missions or of flight.json, or in Import a flight. System, Lever arms, shows them; where they were wrong, System, Flights, Correct: then calibrate again.',
         ],
       },
       { h: 'Check' },

@@ -16,6 +16,7 @@ import { events, say, when_back } from '../../state/store';
 import { Empty } from '../../ui/empty';
 import { date, grouped } from '../../ui/format';
 import { useStable } from '../../ui/use_stable';
+import { FlightForm } from './flight_form';
 
 const days = (seconds: number): string =>
   seconds < 172_800 ? `${Math.ceil(seconds / 3600)} h` : `${Math.floor(seconds / 86_400)} days`;
@@ -24,7 +25,8 @@ export function FlightsPanel() {
   const [all, set_all] = useState<readonly StoredFlight[] | null>(null),
     [bin, set_bin] = useState<readonly StoredFlight[]>([]),
     [problem, set_problem] = useState(''),
-    [sure, set_sure] = useState('');
+    [sure, set_sure] = useState(''),
+    [corrected, set_corrected] = useState<StoredFlight | null>(null);
   const load = useStable((): void => {
     Promise.all([stored_flights(), deleted_flights()]).then(
       ([a, b]) => {
@@ -86,7 +88,7 @@ export function FlightsPanel() {
               <th scope="col">Hand over</th>
               {operator && (
                 <th scope="col">
-                  <span class="sr">Delete</span>
+                  <span class="sr">Correct or delete</span>
                 </th>
               )}
             </tr>
@@ -131,9 +133,19 @@ export function FlightsPanel() {
                     {f.state === 'recording' ? (
                       <span class="mut">finish it first</span>
                     ) : (
-                      <button class="btn small" data-testid="delete-flight" onClick={() => remove(f)}>
-                        {sure === f.id ? 'Press again to delete' : 'Delete'}
-                      </button>
+                      <>
+                        <button
+                          class="btn small"
+                          data-testid="correct-flight"
+                          aria-label={`Correct ${f.name || f.id.slice(0, 8)}`}
+                          onClick={() => set_corrected(f)}
+                        >
+                          Correct
+                        </button>
+                        <button class="btn small" data-testid="delete-flight" onClick={() => remove(f)}>
+                          {sure === f.id ? 'Press again to delete' : 'Delete'}
+                        </button>
+                      </>
                     )}
                   </td>
                 )}
@@ -142,6 +154,16 @@ export function FlightsPanel() {
           </tbody>
         </table>
       </div>
+      {corrected && (
+        <FlightForm
+          key={corrected.id}
+          flight={corrected}
+          close={(changed) => {
+            set_corrected(null);
+            if (changed) void guarded(load_missions, `${corrected.name} is corrected`);
+          }}
+        />
+      )}
       {!all?.length && (
         <Empty loaded={all !== null} failed={problem !== ''}>
           No flight is stored.

@@ -5,7 +5,7 @@ import { NotLoaded, useLoad } from '../../ui/empty';
 import { fixed } from '../../ui/format';
 import { Q } from '../../ui/marks';
 
-const POINTS: Record<string, string> = {
+export const point_words: Readonly<Record<string, string>> = {
   gnss_antenna: 'the GNSS antenna',
   body: 'the middle of the aircraft',
   tag_antenna: 'the tag itself',
@@ -46,12 +46,12 @@ export function LeverPanel() {
       {flight === null && (
         <p class="why">Lever arms come with a flight, and there is none yet: fly one, or import one.</p>
       )}
-      {flight && <p class="why">From {POINTS[flight.track_point] ?? flight.track_point} to each UWB antenna.</p>}
+      {flight && <p class="why">From {point_words[flight.track_point] ?? flight.track_point} to each UWB antenna.</p>}
       {none && (
         <div class="callout caution" role="status">
-          <b>Not set.</b> The UWB antenna counts as being at {POINTS[flight.track_point]}. Measure from there to the UWB
-          antenna and give it with the next flight (tags of POST /missions, or the page of the import): an error of 1 cm
-          shifts each anchor by up to 1 cm.
+          <b>Not set.</b> The UWB antenna counts as being at {point_words[flight.track_point]}. Measure from there to
+          the UWB antenna and give it with the next flight (tags of POST /missions, or the page of the import): an error
+          of 1 cm shifts each anchor by up to 1 cm.
         </div>
       )}
       {flight && flight.tags.length > 0 && (
