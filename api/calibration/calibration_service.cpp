@@ -25,7 +25,7 @@ namespace anchord::api {
 using Json = nlohmann::json;
 
 Result<FlightData> load_flight(MeasurementStore& store, const Mission& mission,
-                               const std::function<bool()>& canceled, bool with_cir,
+                               const std::function<bool()>& canceled, Loaded loaded,
                                const std::vector<Exclusion>& exclusions) {
   FlightData flight;
   flight.mission = mission;
@@ -37,7 +37,10 @@ Result<FlightData> load_flight(MeasurementStore& store, const Mission& mission,
   BOOST_OUTCOME_TRY(const auto n_fixes, store.count_fixes(mission.id));
   BOOST_OUTCOME_TRY(const auto n_ranges, store.count_ranges(mission.id));
   flight.fixes.reserve(n_fixes);
-  flight.ranges.reserve(n_ranges);
+  if (loaded == Loaded::rows)
+    flight.rows.reserve(n_ranges);
+  else
+    flight.ranges.reserve(n_ranges);
   do {
     if (canceled()) return make_error(Errc::canceled, "canceled");
     BOOST_OUTCOME_TRY(auto page, store.fixes(filter));
@@ -49,14 +52,16 @@ Result<FlightData> load_flight(MeasurementStore& store, const Mission& mission,
     }
     filter.after = page.next;
   } while (!filter.after.empty());
-  filter.with_cir = with_cir;
-  if (with_cir) filter.limit = 1000;  // 4 kB each
+  filter.with_cir = loaded == Loaded::ranges_with_cir;
+  if (filter.with_cir) filter.limit = 1000;  // 4 kB each
   do {
     if (canceled()) return make_error(Errc::canceled, "canceled");
     BOOST_OUTCOME_TRY(auto page, store.ranges(filter));
     for (auto& row : page.rows) {
       if (excluded(exclusions, row))
         ++flight.n_ranges_excluded[row.anchor];
+      else if (loaded == Loaded::rows)
+        flight.rows.push_back(flight_range(row));
       else
         flight.ranges.push_back(std::move(row));
     }
@@ -193,7 +198,7 @@ Json flight_provenance(const FlightData& flight, const FlightSolution& s) {
           {"bias_determined", s.shared.bias_determined},
           {"n_fixes", s.n_fixes},
           {"n_ranges", s.n_ranges},
-          {"n_anchor_anchor", std::ranges::count(flight.ranges, RangeKind::anchor_anchor, &Range::kind)},
+          {"n_anchor_anchor", std::ranges::count(flight.rows, RangeKind::anchor_anchor, &FlightRange::kind)},
           {"n_used", s.n_used},
           {"refused", s.refused},
           {"fixes_refused", s.fixes_refused},
@@ -400,16 +405,22 @@ Result<void> CalibrationService::solve_kits(const CalibrationRequest& request, c
 
 Result<void> CalibrationService::load(const CalibrationRequest& request, const ModelRegistry::Active& models,
                                       JobContext& job, Solved& solved) {
+  const Loaded loaded = models.predictor.empty() ? Loaded::rows
+                        : models.needs_cir       ? Loaded::ranges_with_cir
+                                                 : Loaded::ranges;
   std::vector<MissionId> all = request.missions;
   all.insert(all.end(), request.learn_from.begin(), request.learn_from.end());
   for (const auto& id : all) {
     BOOST_OUTCOME_TRY(auto mission, deps_.missions.mission(id));
     BOOST_OUTCOME_TRY(const auto exclusions, deps_.exclusions.exclusions(id));
-    BOOST_OUTCOME_TRY(auto flight, load_flight(
-                                       deps_.measurements, mission, [&] { return job.canceled(); },
-                                       models.needs_cir, exclusions));
-    if (!request.use_anchor_anchor)
-      std::erase_if(flight.ranges, [](const Range& r) { return r.kind == RangeKind::anchor_anchor; });
+    BOOST_OUTCOME_TRY(auto flight,
+                      load_flight(
+                          deps_.measurements, mission, [&] { return job.canceled(); }, loaded, exclusions));
+    if (!request.use_anchor_anchor) {
+      const auto between = [](const auto& r) { return r.kind == RangeKind::anchor_anchor; };
+      std::erase_if(flight.ranges, between);
+      std::erase_if(flight.rows, between);
+    }
     solved.flights.push_back(std::move(flight));
     job.progress(0.3 * static_cast<double>(solved.flights.size()) / static_cast<double>(all.size()), "load",
                  solved.flights.back().mission.name);
@@ -448,8 +459,7 @@ Result<void> CalibrationService::solve_by_models(const CalibrationRequest& reque
     if (n_corrected + n_believed == 0 || !needed) raw.flights.clear();
   }
   for (auto* flights : {&solved.flights, &raw.flights})
-    for (auto& flight : *flights)
-      for (auto& range : flight.ranges) range.cir.reset();
+    for (auto& flight : *flights) flight.keep_rows();
   BOOST_OUTCOME_TRYV(solve_kits(wanted, options, solved));
   if (raw.flights.empty()) return boost::outcome_v2::success();
   job.progress(0.7, "solve", "without the models");

@@ -59,10 +59,12 @@ struct CalibrationRequest {
 /// Reads the body of POST /calibrations; what is wrong is appended to `errors`.
 CalibrationRequest read_calibration_request(const nlohmann::json& body, std::vector<FieldError>& errors);
 
-/// All rows of a mission as the solver takes them, less those of `exclusions` that apply, which are counted;
-/// impulse responses only where asked for.
+/// How much of each range is loaded: what a solve asks, what models ask too, with the impulse responses.
+enum class Loaded : std::uint8_t { rows, ranges, ranges_with_cir };
+
+/// All rows of a mission, less those of `exclusions` that apply, which are counted.
 Result<FlightData> load_flight(MeasurementStore& store, const Mission& mission,
-                               const std::function<bool()>& canceled, bool with_cir = false,
+                               const std::function<bool()>& canceled, Loaded loaded,
                                const std::vector<Exclusion>& exclusions = {});
 
 /// Batch solves as jobs of kind `calibration`. Thread-safe.

@@ -124,37 +124,34 @@ std::size_t TagTrack::after(double t_s) const {
   return static_cast<std::size_t>(found - times_s_.begin());
 }
 
-TagPoint TagTrack::at(double t_s, const Eigen::Vector3d& lever_arm_body_m) const {
-  TagPoint point;
+TrackInterval TagTrack::interval_at(double t_s) const {
   const std::size_t next = after(t_s);
-  if (next == 0) {
-    point.refused = TrackRefusal::outside;
-    return point;
-  }
+  if (next == 0) return {.refused = TrackRefusal::outside};
   const TrackPose& before = poses_[next - 1];
   if (next == poses_.size()) {
-    point.refused = TrackRefusal::outside;
     // The last epoch itself is not an extrapolation.
-    if (before.t_s < t_s) return point;
-    if (before.fix < min_fix_) {
-      point.refused = TrackRefusal::fix_class;
-      return point;
-    }
-    return interpolate(before, before, t_s, lever_arm_body_m);
+    if (before.t_s < t_s) return {.refused = TrackRefusal::outside};
+    if (before.fix < min_fix_) return {.refused = TrackRefusal::fix_class};
+    return {TrackRefusal::none, &before, &before, 0.0};
   }
   const TrackPose& later = poses_[next];
   const double interval_s = later.t_s - before.t_s, share = (t_s - before.t_s) / interval_s;
   const double missed_m = 4.0 * share * (1.0 - share) * missed_midway_m_[next];
-  if (max_gap_s_ ? interval_s > *max_gap_s_ : missed_m > k_most_missed_m) {
-    point.refused = TrackRefusal::gap;
+  if (max_gap_s_ ? interval_s > *max_gap_s_ : missed_m > k_most_missed_m)
+    return {.refused = TrackRefusal::gap};
+  if (before.fix < min_fix_ || later.fix < min_fix_) return {.refused = TrackRefusal::fix_class};
+  return {TrackRefusal::none, &before, &later, missed_m};
+}
+
+TagPoint TagTrack::at(double t_s, const Eigen::Vector3d& lever_arm_body_m) const {
+  const TrackInterval interval = interval_at(t_s);
+  if (interval.refused != TrackRefusal::none) {
+    TagPoint point;
+    point.refused = interval.refused;
     return point;
   }
-  if (before.fix < min_fix_ || later.fix < min_fix_) {
-    point.refused = TrackRefusal::fix_class;
-    return point;
-  }
-  point = interpolate(before, later, t_s, lever_arm_body_m);
-  point.covariance_m2.diagonal().array() += missed_m * missed_m;
+  TagPoint point = interpolate(*interval.before, *interval.later, t_s, lever_arm_body_m);
+  point.covariance_m2.diagonal().array() += interval.missed_m * interval.missed_m;
   return point;
 }
 

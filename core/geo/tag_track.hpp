@@ -53,6 +53,13 @@ struct TrackOptions {
   std::optional<double> max_gap_s{};
 };
 
+/// The two epochs about an instant.
+struct TrackInterval {
+  TrackRefusal refused{TrackRefusal::none};
+  const TrackPose *before{}, *later{};  ///< of the track; one and the same at its last epoch; none: refused
+  double missed_m{};                    ///< by the straight line between them, one sigma
+};
+
 /// Where a tag antenna was at any instant between two epochs of the track.
 ///
 /// Position linear between the neighbours, attitude by slerp, lever arm added (body: forward, left, up).
@@ -69,6 +76,8 @@ class TagTrack {
            const TrackOptions& options = {});
 
   TagPoint at(double t_s, const Eigen::Vector3d& lever_arm_body_m = Eigen::Vector3d::Zero()) const;
+  /// What `at` interpolates in.
+  TrackInterval interval_at(double t_s) const;
   std::span<const TrackPose> poses() const { return poses_; }
   bool has_attitude() const { return has_attitude_; }
   const InterpolationError& interpolation_error() const { return missed_; }

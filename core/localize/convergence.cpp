@@ -31,16 +31,17 @@ void add_ranges(const AnchorSolution& anchor, UtcTime from, ConvergenceStep& at)
 
 /// The flight in order of time, each range with what belongs to it.
 FlightData in_time_order(const FlightData& flight) {
-  std::vector<std::size_t> order(flight.ranges.size());
+  std::vector<std::size_t> order(flight.n_ranges());
   std::iota(order.begin(), order.end(), 0U);
-  std::ranges::stable_sort(order, {}, [&](std::size_t i) { return flight.ranges[i].time; });
+  std::ranges::stable_sort(order, {}, [&](std::size_t i) { return flight.range(i).time; });
   const auto ordered = [&](const auto& of_ranges) {
     auto out = of_ranges;
     for (std::size_t k = 0; k < out.size(); ++k) out[k] = of_ranges[order[k]];
     return out;
   };
   FlightData out = flight;
-  out.ranges = ordered(flight.ranges);
+  out.keep_rows();
+  out.rows = ordered(out.rows);
   out.error_models = ordered(flight.error_models);
   out.received_m = ordered(flight.received_m);
   return out;
@@ -49,7 +50,7 @@ FlightData in_time_order(const FlightData& flight) {
 /// Its first n ranges.
 FlightData first_part(const FlightData& flight, std::size_t n) {
   FlightData part = flight;
-  part.ranges.resize(n);
+  part.rows.resize(n);
   part.error_models.resize(std::min(n, flight.error_models.size()));
   part.received_m.resize(std::min(n, flight.received_m.size()));
   return part;
@@ -57,8 +58,7 @@ FlightData first_part(const FlightData& flight, std::size_t n) {
 
 /// Without what a model made of the ranges.
 FlightData as_received(FlightData flight) {
-  for (std::size_t i = 0; i < flight.received_m.size(); ++i)
-    flight.ranges[i].distance_m = flight.received_m[i];
+  for (std::size_t i = 0; i < flight.received_m.size(); ++i) flight.rows[i].distance_m = flight.received_m[i];
   flight.received_m.clear();
   flight.error_models.clear();
   return flight;
@@ -78,7 +78,7 @@ Result<Convergence> convergence_of(const FlightData& flight, const FlightOptions
   if (steps < 1 || steps > 50) return make_error(Errc::invalid_argument, "iterations must be 1 to 50");
   BOOST_OUTCOME_TRYV(options.check());
   const FlightData whole = in_time_order(flight);
-  const std::vector<Range>& all = whole.ranges;
+  const std::vector<FlightRange>& all = whole.rows;
   Convergence course;
   std::map<NetworkId, std::size_t> heard;
   std::size_t counted = 0;

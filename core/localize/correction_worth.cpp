@@ -85,7 +85,7 @@ CorrectionWorth correction_worth(const FlightSolution& raw, const FlightSolution
                                  const FlightData& corrected_flight, double block_s) {
   std::map<std::pair<NetworkId, Key>, RangeErrorModel> error_models;
   for (std::size_t i = 0; i < corrected_flight.error_models.size(); ++i) {
-    const Range& range = corrected_flight.ranges[i];
+    const FlightRange range = corrected_flight.range(i);
     if (corrected_flight.error_models[i])
       error_models[{range.anchor, {range.time.ns, range.tag, range.antenna}}] =
           *corrected_flight.error_models[i];

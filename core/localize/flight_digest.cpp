@@ -17,7 +17,8 @@ std::string flight_digest(const FlightData& flight) {
       sha.add(fix.position.height_m);
     }
   }
-  for (const Range& range : flight.ranges) {
+  for (std::size_t i = 0; i < flight.n_ranges(); ++i) {
+    const FlightRange range = flight.range(i);
     add_time(range.time);
     sha.add(std::uint64_t{range.tag.value});
     sha.add(std::uint64_t{range.anchor.value});

@@ -11,7 +11,7 @@ namespace anchord {
 namespace {
 
 /// Word under which a range is refused before any geometry, or empty.
-std::string refusal(const Range& range, const FlightOptions& options) {
+std::string refusal(const FlightRange& range, const FlightOptions& options) {
   if (!std::isfinite(range.distance_m)) return "not_finite";
   if (range.distance_m == 0.0) return "zero_range";  // the device's failure value
   if (range.distance_m < options.min_range_m || range.distance_m > options.max_range_m)
@@ -19,7 +19,7 @@ std::string refusal(const Range& range, const FlightOptions& options) {
   return {};
 }
 
-std::optional<Eigen::Vector3d> lever_arm(const Mission& mission, const Range& range) {
+std::optional<Eigen::Vector3d> lever_arm(const Mission& mission, const FlightRange& range) {
   for (const auto& antenna : mission.tags) {
     if (antenna.tag == range.tag && antenna.antenna == range.antenna) return antenna.lever_arm_body_m;
   }
@@ -42,7 +42,7 @@ void name_arms(FlightRows& rows) {
   for (AnchorRows& anchor : rows.anchors) {
     for (JointRow& row : anchor.rows) {
       const int arm = arms.at({row.tag, row.antenna});
-      if (arm < k_most_antennas) row.arm = arm;
+      if (arm < k_most_antennas) row.arm = static_cast<std::int8_t>(arm);
     }
   }
 }
@@ -80,9 +80,9 @@ using Between = std::map<std::pair<NetworkId, NetworkId>, std::vector<double>>;
 
 /// Of the ranges at `usable` those that repeat no earlier one: same time, radios, antenna and number. The
 /// first of each stays; in order.
-std::vector<std::size_t> without_repeats(const std::vector<Range>& ranges, std::vector<std::size_t> usable) {
+std::vector<std::size_t> without_repeats(const FlightData& flight, std::vector<std::size_t> usable) {
   const auto identity = [&](std::size_t i) {
-    const Range& r = ranges[i];
+    const FlightRange r = flight.range(i);
     return std::tuple(r.time.ns, r.tag, r.antenna, r.anchor, r.seq);
   };
   std::ranges::stable_sort(usable, {}, identity);
@@ -97,8 +97,8 @@ Between add_ranges(const FlightData& flight, const FlightOptions& options, Fligh
   std::map<NetworkId, AnchorRows> anchors;
   std::vector<std::size_t> usable;
   Between between;
-  for (std::size_t i = 0; i < flight.ranges.size(); ++i) {
-    const Range& range = flight.ranges[i];
+  for (std::size_t i = 0; i < flight.n_ranges(); ++i) {
+    const FlightRange range = flight.range(i);
     if (range.kind == RangeKind::anchor_anchor) {
       if (refusal(range, options).empty() && range.tag != range.anchor)
         between[std::minmax(range.tag, range.anchor)].push_back(range.distance_m);
@@ -113,21 +113,25 @@ Between add_ranges(const FlightData& flight, const FlightOptions& options, Fligh
       ++anchor.refused[why];
   }
   std::map<NetworkId, std::size_t> n_usable, n_kept;
-  for (const std::size_t i : usable) ++n_usable[flight.ranges[i].anchor];
-  const auto kept = without_repeats(flight.ranges, std::move(usable));
-  for (const std::size_t i : kept) ++n_kept[flight.ranges[i].anchor];
+  for (const std::size_t i : usable) ++n_usable[flight.range(i).anchor];
+  const auto kept = without_repeats(flight, std::move(usable));
+  for (const std::size_t i : kept) ++n_kept[flight.range(i).anchor];
   for (const auto& [id, n] : n_usable) {
     anchors[id].rows.reserve(n_kept[id]);
     if (n > n_kept[id]) anchors[id].refused["duplicate"] = n - n_kept[id];
   }
   for (const std::size_t i : kept) {
-    const Range& range = flight.ranges[i];
+    const FlightRange range = flight.range(i);
     auto& own = anchors[range.anchor].rows;
-    own.push_back({seconds_between(rows.epoch, range.time), range.distance_m,
-                   lever_arm(flight.mission, range).value(), range.tag, range.antenna,
-                   i < flight.error_models.size() ? flight.error_models[i] : std::nullopt,
-                   range.rss_dbm ? range.rss_dbm : range.rx_dbm});
-    if (i < flight.received_m.size()) own.back().received_m = flight.received_m[i];
+    own.push_back({.t_s = seconds_between(rows.epoch, range.time),
+                   .distance_m = range.distance_m,
+                   .lever_arm_body_m = lever_arm(flight.mission, range).value(),
+                   .tag = range.tag,
+                   .antenna = range.antenna,
+                   .rss_dbm = range.rss_dbm,
+                   .received_m = i < flight.received_m.size() ? flight.received_m[i] : range.distance_m});
+    if (i < flight.error_models.size() && flight.error_models[i])
+      own.back().error_model = &*flight.error_models[i];
   }
   for (const auto& [id, n] : flight.n_ranges_excluded) anchors[id].refused["excluded"] += n;
   for (auto& [id, anchor] : anchors) {
@@ -161,7 +165,7 @@ Result<FlightRows> flight_rows(const FlightData& flight, const FlightOptions& op
   auto checked = check_track(flight.fixes, kind, options.min_fix, options.track);
   auto& fixes = checked.fixes;
   if (fixes.empty()) return make_error(Errc::too_few_observations, "no usable position in the track");
-  if (flight.ranges.empty()) return make_error(Errc::too_few_observations, "no ranges");
+  if (flight.n_ranges() == 0) return make_error(Errc::too_few_observations, "no ranges");
   BOOST_OUTCOME_TRY(const auto frame,
                     frame_of(kind == TrackFrame::wgs84 ? checked.centre : std::nullopt, options));
   const UtcTime epoch = fixes.front().time;

@@ -18,10 +18,11 @@ struct JointRow {
   Eigen::Vector3d lever_arm_body_m{0, 0, 0};
   NetworkId tag{};
   std::uint8_t antenna{0};
-  std::optional<RangeErrorModel> error_model{};
+  /// Its antenna among those with a vertical arm of their own; absent: the common.
+  std::optional<std::int8_t> arm{};
+  const RangeErrorModel* error_model{};  ///< of the flight's; absent: no model spoke
   std::optional<double> rss_dbm{};
-  std::optional<double> received_m{};  ///< where a model has corrected the distance
-  std::optional<int> arm{};  ///< its antenna among those with a vertical arm of their own; absent: the common
+  double received_m{};  ///< as received; distance_m where no model has corrected that
 };
 
 /// One antenna of the aircraft that ranges came from.
@@ -65,6 +66,8 @@ struct FlightRows {
 /// of a declared tag. Refused ones are counted by reason. The origin is the one asked for, else the middle of
 /// the positions believed. errors  too_few_observations: no usable fix or no range at all, or an origin
 /// elsewhere
+/// flight  outlives what is returned, which refers to its error models
 Result<FlightRows> flight_rows(const FlightData& flight, const FlightOptions& options);
+Result<FlightRows> flight_rows(FlightData&& flight, const FlightOptions& options) = delete;
 
 }  // namespace anchord

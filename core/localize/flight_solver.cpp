@@ -176,7 +176,7 @@ std::size_t n_believed(const FlightRows& flight) {
   std::size_t n = 0;
   for (const AnchorRows& anchor : flight.anchors) {
     n += static_cast<std::size_t>(
-        std::ranges::count_if(anchor.rows, [](const JointRow& row) { return row.error_model.has_value(); }));
+        std::ranges::count_if(anchor.rows, [](const JointRow& row) { return row.error_model != nullptr; }));
   }
   return n;
 }
@@ -306,7 +306,7 @@ FlightSolution describe(Work& work, const FlightData& flight) {
     solution.anchors.push_back(std::move(anchor));
   }
   solution.fixes_refused = work.rows.fixes_refused;
-  solution.n_ranges = flight.ranges.size();
+  solution.n_ranges = flight.n_ranges();
   solution.n_fixes = flight.fixes.size();
   return solution;
 }

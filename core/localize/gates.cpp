@@ -223,7 +223,7 @@ std::vector<Gate> gates_of(const FlightRows& flight, const JointFit& fit, std::s
   // What a model has judged is corrected and weighed as what it is: late ranges are no surprise there.
   const auto& rows = flight.anchors[index].rows;
   const auto n_judged =
-      std::ranges::count_if(rows, [](const JointRow& row) { return row.error_model.has_value(); });
+      std::ranges::count_if(rows, [](const JointRow& row) { return row.error_model != nullptr; });
   if (2 * static_cast<std::size_t>(n_judged) < rows.size())
     gates.push_back(blocked(fit, index, options, limits));
   gates.push_back(at_most("residual_scale", solution.residual_scale_m, limits.residual_scale_m,
@@ -266,6 +266,7 @@ std::vector<RangeResidual> residuals_of(const FlightRows& flight, const JointFit
   const AnchorBlock& block = fit.normal.anchors[index];
   const JointState::Anchor& anchor = fit.state.anchors[index];
   std::vector<RangeResidual> all;
+  all.reserve(flight.anchors[index].rows.size());
   for (const JointRow& row : flight.anchors[index].rows) {
     const JointLine line = linearise(flight.track, row, fit.state.shared, anchor);
     if (line.refused != TrackRefusal::none) continue;
@@ -277,7 +278,7 @@ std::vector<RangeResidual> residuals_of(const FlightRows& flight, const JointFit
     one.tag = row.tag;
     one.antenna = row.antenna;
     one.tag_m = line.antenna_m;
-    one.distance_m = row.received_m.value_or(row.distance_m);
+    one.distance_m = row.received_m;
     one.residual_m = line.residual_m;
     one.corrected_m = line.residual_m + (line.antenna_m - anchor.position_m).norm();
     one.sigma_m = std::sqrt(sigma2);

@@ -212,7 +212,7 @@ void build_anchor(const AnchorTask& task, AnchorBlock& block, JointNormal& norma
     }
     const double centred_m = line.residual_m - (row.error_model ? expected_error_m(*row.error_model) : 0.0);
     sizes.push_back(std::abs(centred_m));
-    error_models.push_back(row.error_model ? &*row.error_model : nullptr);
+    error_models.push_back(row.error_model);
     placed.push_back(&row);
     centred_of_m.push_back(centred_m);
     times_s.push_back(row.t_s);

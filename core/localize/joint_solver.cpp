@@ -15,7 +15,7 @@ double clipped(double value, double limit) { return std::clamp(value, -limit, li
 
 bool has_error_models(const FlightRows& flight) {
   return std::ranges::any_of(flight.anchors, [](const AnchorRows& anchor) {
-    return std::ranges::any_of(anchor.rows, [](const JointRow& row) { return row.error_model.has_value(); });
+    return std::ranges::any_of(anchor.rows, [](const JointRow& row) { return row.error_model != nullptr; });
   });
 }
 

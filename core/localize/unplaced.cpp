@@ -50,7 +50,8 @@ std::string outside(const FlightRows& rows) {
 
 std::string bounds(const FlightData& flight, const FlightOptions& options) {
   std::vector<double> distances_m;
-  for (const Range& range : flight.ranges) {
+  for (std::size_t i = 0; i < flight.n_ranges(); ++i) {
+    const FlightRange range = flight.range(i);
     if (range.kind == RangeKind::tag_anchor) distances_m.push_back(range.distance_m);
   }
   return text("the median range is %.1f m, usable are %.2f to %.0f m: range_m is in metres",

@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <tuple>
+#include <utility>
 
 #include "tests/core/localize/flight_support.hpp"
 
@@ -31,6 +33,40 @@ TEST(FlightSolver, FindsEveryAnchorOfAnOrdinaryFlight) {
     EXPECT_GT(e.gdop.value(), 0.0);
   }
   EXPECT_TRUE(s.value().shared.bias_determined);
+}
+
+TEST(FlightSolver, AsksNothingOfARangeThatItsRowDoesNotHold) {
+  MadeFlight made;
+  made.nlos_share = 0.2;
+  FlightData flight = make_flight(made);
+  for (std::size_t i = 0; i < flight.ranges.size(); ++i) flight.ranges[i].seq = i;
+  flight.ranges.push_back(flight.ranges.front());  // a repeat
+  Range pair = flight.ranges.front();
+  pair.kind = RangeKind::anchor_anchor;
+  std::tie(pair.tag, pair.anchor) = std::pair(NetworkId{0x6000}, NetworkId{0x6001});
+  pair.distance_m = (made.anchors[0] - made.anchors[1]).norm();
+  flight.ranges.push_back(pair);
+  for (const bool with_models : {false, true}) {
+    if (with_models) {
+      flight.error_models.resize(flight.ranges.size());
+      for (std::size_t i = 0; i < flight.ranges.size(); i += 2) flight.error_models[i] = RangeErrorModel{0.9};
+    }
+    FlightData rows = flight;
+    rows.keep_rows();
+    EXPECT_TRUE(rows.ranges.empty());
+    const auto whole = solve_flight(flight), kept = solve_flight(rows);
+    ASSERT_TRUE(whole && kept);
+    EXPECT_EQ(kept.value().n_ranges, whole.value().n_ranges);
+    EXPECT_EQ(kept.value().refused, whole.value().refused);
+    EXPECT_EQ(kept.value().notes, whole.value().notes);
+    EXPECT_EQ(whole.value().refused.at("duplicate"), 1U);
+    for (std::size_t i = 0; i < 4; ++i) {
+      const auto &a = whole.value().anchors[i], &b = kept.value().anchors[i];
+      EXPECT_EQ(b.estimate.best.value().position.m, a.estimate.best.value().position.m);
+      EXPECT_EQ(b.estimate.best->covariance_m2, a.estimate.best->covariance_m2);
+      EXPECT_EQ(b.residuals.size(), a.residuals.size());
+    }
+  }
 }
 
 TEST(FlightSolver, AnswersOnTheGlobeForAnRtkTrack) {
