@@ -30,6 +30,7 @@
 namespace anchord {
 class Backups;
 class Broker;
+class CirArchive;
 class Clock;
 class DeviceControl;
 class DeviceRows;
@@ -95,7 +96,10 @@ class Application {
     RunWork run_plan_work = plan_work_inline;  ///< decodes, turns and traces pictures of plans
     bool model_key_is_new{false};              ///< models of before it existed are signed at the start
     std::int64_t keep_deleted_ns{30LL * 86'400 * 1'000'000'000};  ///< a deleted mission, in running time
-    const SteadyClock* steady{&system_steady_clock()};            ///< what every duration is measured by
+    CirArchive* cir_archive{nullptr};  ///< null: impulse responses stay in the database
+    std::optional<std::int64_t>
+        keep_cir_days{};  ///< after landing, until they go into files; absent: for ever
+    const SteadyClock* steady{&system_steady_clock()};  ///< what every duration is measured by
     /// The bytes of a GeoPackage; unset: there is nobody who writes one.
     std::function<Result<std::string>(std::span<const FeatureTable>, UtcTime)> geopackage =
         [](std::span<const FeatureTable>, UtcTime) -> Result<std::string> {

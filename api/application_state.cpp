@@ -73,7 +73,9 @@ Application::State::State(Deps d)
                .ended = [this](const std::string& token_id) { return deps.access.ended(token_id); },
                .now_s = deps.flight_clock}),
       stream({deps.devices, stores.service, stores.missions, events}),
-      housekeeping({stores.bin, running, events, [this] { return router.purge_answers(); },
+      cir_retention({deps.cir_archive, deps.keep_cir_days, events, stores.access, deps.clock, steady,
+                     [this] { return missions.recording(); }, deps.storage_status}),
+      housekeeping({stores.bin, running, events, [this] { return router.purge_answers(); }, cir_retention,
                     deps.keep_deleted_ns, deps.housekeeping_by_hand}),
       ingest(stores.measurements, missions),
       device_ingest(stores.measurements, missions),
@@ -114,6 +116,7 @@ Application::State::State(Deps d)
                 audit,
                 deps.build,
                 deps.backups,
+                cir_retention,
                 deps.storage_status,
                 [this] { return counts(); },
                 [this] { return device_clock(); },
@@ -261,6 +264,7 @@ void Application::State::add_routes() {
   add_access_routes(router, deps.access, stores.sites);
   add_alarm_routes(router, admin_api);
   add_backup_routes(router, admin_api);
+  add_cir_archive_routes(router, admin_api);
   add_system_routes(router, admin_api);
   add_ogc_routes(router, exchange_api);
   add_anchor_file_routes(router, exchange_api);

@@ -10,6 +10,7 @@
 
 #include "api/admin/access.hpp"
 #include "api/admin/alarm_board.hpp"
+#include "api/admin/cir_retention.hpp"
 #include "api/admin/clock_watch.hpp"
 #include "api/admin/event_log.hpp"
 #include "api/admin/flight_events.hpp"
@@ -101,6 +102,7 @@ struct Application::State {
   SiteStructures structures;
   FlightService flights;
   DeviceStream stream;
+  CirRetention cir_retention;
   Housekeeping housekeeping;
   ClockWatch clock_watch;
   IngestService ingest;

@@ -107,7 +107,7 @@ set(api/formats_source "^(iconv\\.h$|nlohmann/json\\.hpp$|zlib\\.h$|zip\\.h$|pug
 
 set(server/storage_header "^(${everywhere})")
 # Of JSON the one column that is GeoJSON.
-set(server/storage_source "^(nlohmann/json\\.hpp$|sqlite3\\.h$|SQLiteCpp/|libpq-fe\\.h$|sys/|unistd\\.h$|fcntl\\.h$)")
+set(server/storage_source "^(nlohmann/json\\.hpp$|sqlite3\\.h$|SQLiteCpp/|libpq-fe\\.h$|zlib\\.h$|sys/|unistd\\.h$|fcntl\\.h$)")
 
 # The one folder that knows the library of MQTT.
 set(server/mqtt_header "^(${everywhere})")

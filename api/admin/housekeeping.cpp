@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 
+#include "api/admin/cir_retention.hpp"
 #include "api/admin/event_log.hpp"
 #include "api/admin/running_time.hpp"
 #include "core/ports/mission_bin.hpp"
@@ -55,9 +56,10 @@ void Housekeeping::loop() {
 }
 
 /// False when stopping.
-bool Housekeeping::pause() {
+bool Housekeeping::pause(std::chrono::milliseconds time) {
+  if (deps_.by_hand) return true;
   auto wishes = wishes_.lock();
-  return !wishes.wait_for(told_, k_pause, [](const Wishes& w) { return w.stop; });
+  return !wishes.wait_for(told_, time, [](const Wishes& w) { return w.stop; });
 }
 
 void Housekeeping::round() {
@@ -72,8 +74,10 @@ void Housekeeping::round() {
   }
   remove_marked();
   while (deps_.purge_answers && deps_.purge_answers()) {
-    if (!pause()) return;
+    if (!pause(k_pause)) return;
   }
+  // The longest last.
+  deps_.cir_retention.round([this](std::chrono::milliseconds time) { return pause(time); });
 }
 
 void Housekeeping::remove_marked() {
@@ -84,7 +88,7 @@ void Housekeeping::remove_marked() {
     const auto took = Steady::now() - begun;
     if (took > k_slow) rows = std::max(k_fewest_rows, rows / 2);
     if (took < k_quick) rows = std::min(k_most_rows, rows * 2);
-    if (!pause()) return;
+    if (!pause(k_pause)) return;
   }
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <condition_variable>
 #include <cstdint>
 #include <functional>
@@ -14,12 +15,13 @@ class MissionBin;
 
 namespace anchord::api {
 
+class CirRetention;
 class EventLog;
 class RunningTime;
 
-/// What is removed after its time, little by little on a thread of its own: deleted missions, kept answers. A
-/// slice is one short transaction and is followed by a pause, so that a flight that records never waits for
-/// it.
+/// What is removed after its time, little by little on a thread of its own: deleted missions, kept answers,
+/// and impulse responses that go into files. A slice is one short transaction and is followed by a pause, so
+/// that a flight that records never waits for it.
 class Housekeeping {
  public:
   struct Deps {
@@ -27,6 +29,7 @@ class Housekeeping {
     const RunningTime& running;
     EventLog& events;
     std::function<bool()> purge_answers;  ///< one slice; true: there may be more
+    CirRetention& cir_retention;
     std::int64_t keep_deleted_ns{30LL * 86'400 * 1'000'000'000};
     bool by_hand{false};  ///< no thread: the owner calls round() (tests)
   };
@@ -42,7 +45,7 @@ class Housekeeping {
 
  private:
   void loop();
-  bool pause();
+  bool pause(std::chrono::milliseconds time);
   void remove_marked();
 
   struct Wishes {

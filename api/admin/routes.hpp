@@ -25,6 +25,7 @@ namespace anchord::api {
 
 class AccessService;
 class AlarmBoard;
+class CirRetention;
 class EventLog;
 class Hub;
 class JobService;
@@ -49,6 +50,7 @@ struct AdminApi {
   Audit audit;
   BuildInfo build;
   Backups& backups;
+  CirRetention& cir_retention;
   std::function<StorageStatus()> storage;
   std::function<ServerCounts()> counts;
   std::function<nlohmann::ordered_json()> device_clock, drone, mqtt;  ///< as /system shows them; null: none
@@ -64,6 +66,7 @@ Result<Job> begin_backup(const AdminApi& admin);
 void add_access_routes(Router& router, AccessService& access, SiteStore& sites);
 void add_alarm_routes(Router& router, AdminApi& admin);
 void add_backup_routes(Router& router, AdminApi& admin);
+void add_cir_archive_routes(Router& router, AdminApi& admin);
 void add_job_routes(Router& router, AdminApi& admin);
 void add_system_routes(Router& router, AdminApi& admin);
 

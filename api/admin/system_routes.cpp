@@ -2,6 +2,7 @@
 #include <nlohmann/json.hpp>
 
 #include "api/admin/alarm_board.hpp"
+#include "api/admin/cir_retention.hpp"
 #include "api/admin/docs_page.hpp"
 #include "api/admin/event_log.hpp"
 #include "api/admin/routes.hpp"
@@ -53,7 +54,8 @@ Response system(AdminApi& s, const Request&) {
                              {"reason", storage.reason},
                              {"clock", s.device_clock()},
                              {"drone", s.drone()},
-                             {"mqtt", s.mqtt()}});
+                             {"mqtt", s.mqtt()},
+                             {"cir_archive", s.cir_retention.status()}});
 }
 
 Response metrics(AdminApi& s, const Request&) {

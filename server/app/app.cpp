@@ -63,8 +63,9 @@ std::string settings_text(const Config& config) {
   return out;
 }
 
-/// Backup, calibration, discovery, training, pictures of plans, and room for one more.
-constexpr std::size_t k_kinds_of_jobs = 6;
+/// Backup, calibration, discovery, training, pictures of plans, the archive of impulse responses, and room
+/// for one more.
+constexpr std::size_t k_kinds_of_jobs = 7;
 
 /// For the commands of this machine: a plain address if there is one, and never one that is only for
 /// listening.
@@ -390,6 +391,9 @@ void App::State::compose() {
   deps.job_lease = config.seconds("jobs.lease_s");
   deps.worker_name = "server " + worker_name();
   deps.model_key_is_new = model_key.fresh;
+  deps.cir_archive = &database->cir_archive();
+  if (const auto days = config.count("missions.keep_cir_days"); days > 0)  // "off" is no number
+    deps.keep_cir_days = static_cast<std::int64_t>(days);
   deps.keep_deleted_ns =
       static_cast<std::int64_t>(config.count("missions.keep_deleted_days")) * 86'400 * 1'000'000'000;
   application = std::make_unique<api::Application>(std::move(deps));

@@ -15,6 +15,8 @@ std::string type_of(const server::Option& option) {
       return "SECONDS";
     case metres:
       return "METRES";
+    case days:
+      return "DAYS|off";
     case list:
       return "LIST";
     case choice:

@@ -69,6 +69,11 @@ constexpr std::array k_options = {
            seconds},
     Option{"missions.keep_deleted_days", "30",
            "days of running time for which a deleted mission can be restored", count},
+    Option{"missions.keep_cir_days", "off",
+           "days after landing for which impulse responses, the bulk of a database, stay in it; after that "
+           "they are moved into files in DATA_DIR/cir-archive, from which they are read as before; off: they "
+           "stay",
+           days},
     Option{"drone.address", "",
            "address of the MAVLink connection to the autopilot, like udp://:14550, tcp://127.0.0.1:5760 or "
            "serial:/dev/ttyACM0; empty: flown by hand"},
@@ -166,6 +171,11 @@ std::string wrong(const Option& option, const std::string& value) {
     case count: {
       const auto n = number(value);
       return n && *n >= 1 && *n <= 1e9 && *n == std::floor(*n) ? "" : "must be a whole number from 1";
+    }
+    case days: {
+      const auto n = number(value);
+      if (value == "off" || (n && *n >= 1 && *n <= 36'500 && *n == std::floor(*n))) return {};
+      return "must be off, or a whole number of days from 1 to 36500";
     }
     case seconds: {
       const auto n = number(value);

@@ -17,7 +17,7 @@
 
 namespace anchord::server {
 
-enum class OptionKind : std::uint8_t { text, flag, count, seconds, metres, list, choice, database };
+enum class OptionKind : std::uint8_t { text, flag, count, seconds, metres, days, list, choice, database };
 
 /// One setting. The table of all of them is the only place that knows names, defaults and meaning.
 struct Option {

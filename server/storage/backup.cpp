@@ -42,6 +42,8 @@ Result<void> copy_pages(SqliteConnection& source, const std::filesystem::path& f
                     "backup to " + file.string() + ": " + sqlite3_errstr(code));
 }
 
+}  // namespace
+
 Result<std::string> sha256_of_file(const std::filesystem::path& file) {
   std::ifstream in(file, std::ios::binary);
   Sha256 digest;
@@ -50,11 +52,9 @@ Result<std::string> sha256_of_file(const std::filesystem::path& file) {
     in.read(chunk.data(), static_cast<std::streamsize>(chunk.size()));
     digest.add({chunk.data(), static_cast<std::size_t>(in.gcount())});
   }
-  if (!in.eof()) return make_error(Errc::storage_unavailable, "backup: cannot read back " + file.string());
+  if (!in.eof()) return make_error(Errc::storage_unavailable, "cannot read back " + file.string());
   return digest.hex();
 }
-
-}  // namespace
 
 Result<BackupReport> back_up(SqliteConnection& source, const std::filesystem::path& file) {
   std::error_code error;

@@ -11,4 +11,7 @@ Result<BackupReport> back_up(SqliteConnection& source, const std::filesystem::pa
 /// leaves nothing behind where it fails.
 Result<std::filesystem::path> save_beside(SqliteConnection& source, const std::filesystem::path& database);
 
+/// Of all its bytes. errors: storage_unavailable
+Result<std::string> sha256_of_file(const std::filesystem::path& file);
+
 }  // namespace anchord::sql

@@ -6,7 +6,8 @@
 #include <set>
 
 #include "core/types/mission.hpp"
-#include "server/storage/bundle_tables.hpp"
+#include "server/storage/bundle_cir.hpp"
+#include "server/storage/measurement_rows.hpp"
 #include "server/storage/stores.hpp"
 
 namespace anchord::sql {
@@ -67,6 +68,12 @@ BundleRow read_row(Query& query, const BundleTable& table) {
   row.reserve(table.columns.size());
   for (const auto& column : table.columns) row.push_back(read_cell(query, column.kind));
   return row;
+}
+
+/// Behind the columns of read_row(): of a range whose impulse response is in a file.
+std::optional<CirDigest> read_moved(Query& query, const BundleSpec& spec) {
+  if (!spec.with_cir || query.null()) return std::nullopt;
+  return read_digest(query);
 }
 
 void bind_cell(Query& query, const BundleCell& cell, CellKind kind) {
@@ -171,8 +178,8 @@ Named named_by(Connection& c, std::int64_t mission) {
 
 class Writer {
  public:
-  Writer(Connection& c, std::int64_t mission, BundleSink& sink)
-      : c_(c), mission_(mission), named_(named_by(c, mission)), sink_(sink) {}
+  Writer(Connection& c, const MissionId& id, std::int64_t mission, const CirFolder& files, BundleSink& sink)
+      : c_(c), id_(id), mission_(mission), named_(named_by(c, mission)), archive_(files), sink_(sink) {}
   std::optional<Error> run() {
     for (const auto& spec : bundle_specs()) {
       if (auto begun = sink_.begin(spec.table); !begun) return begun.error();
@@ -198,14 +205,22 @@ class Writer {
     else
       query << SiteId{*of};
     while (query.step()) {
-      if (auto written = sink_.row(read_row(query, spec.table)); !written) return written.error();
+      BundleRow row = read_row(query, spec.table);
+      if (const auto moved = read_moved(query, spec)) {
+        const auto cir = archive_.find(identity_of(spec, row, id_), *moved);
+        if (!cir) return cir.error();
+        put_cir(row, cir.value());
+      }
+      if (auto written = sink_.row(row); !written) return written.error();
     }
     return std::nullopt;
   }
 
   Connection& c_;
+  const MissionId id_;
   const std::int64_t mission_;
   const Named named_;
+  CirFinder archive_;
   BundleSink& sink_;
 };
 
@@ -408,7 +423,16 @@ class Reader {
         bind_cell(query, row[key], spec.table.columns[key].kind);
     }
     if (!query.step()) return std::nullopt;
-    return read_row(query, spec.table);
+    BundleRow here = read_row(query, spec.table);
+    if (const auto moved = read_moved(query, spec)) {
+      // The digest is enough to know that it is the same one; of another it is enough that there is one.
+      const auto cir = cir_of(row);
+      if (cir && digest_of(*cir) == *moved)
+        std::copy(row.end() - k_cir_cells, row.end(), here.end() - k_cir_cells);
+      else
+        here.back() = std::string();
+    }
+    return here;
   }
 
   bool frame_named(const BundleCell& name) {
@@ -465,7 +489,7 @@ class Reader {
   void add_cir(std::int64_t range, const BundleRow& row) {
     Query query(c_, k_insert_cir);
     query << range;
-    for (std::size_t i = row.size() - 4; i < row.size(); ++i)
+    for (std::size_t i = row.size() - k_cir_cells; i < row.size(); ++i)
       bind_cell(query, row[i], i + 1 == row.size() ? CellKind::bytes : CellKind::real);
     query.run();
   }
@@ -497,7 +521,7 @@ class Reader {
 
 class SqlBundleStore final : public BundleStore {
  public:
-  explicit SqlBundleStore(Gate& gate) : gate_(gate) {
+  SqlBundleStore(Gate& gate, const CirFolder& files) : gate_(gate), files_(files) {
     for (const auto& spec : bundle_specs()) tables_.push_back(spec.table);
     for (const auto& spec : site_bundle_specs()) site_tables_.push_back(spec.table);
   }
@@ -513,7 +537,7 @@ class SqlBundleStore final : public BundleStore {
       if (query.step() && query.one_of(k_mission_state_words) == MissionState::recording)
         return make_error(Errc::conflict,
                           query.text() + " is recording: finish it first, then take its bundle");
-      return Writer(c, *key, sink).run();
+      return Writer(c, mission, *key, files_, sink).run();
     });
     if (error) return *error;
     return boost::outcome_v2::success();
@@ -552,11 +576,14 @@ class SqlBundleStore final : public BundleStore {
 
  private:
   Gate& gate_;
+  const CirFolder files_;
   std::vector<BundleTable> tables_, site_tables_;
 };
 
 }  // namespace
 
-std::unique_ptr<BundleStore> make_bundle_store(Gate& gate) { return std::make_unique<SqlBundleStore>(gate); }
+std::unique_ptr<BundleStore> make_bundle_store(Gate& gate, const CirFolder& files) {
+  return std::make_unique<SqlBundleStore>(gate, files);
+}
 
 }  // namespace anchord::sql

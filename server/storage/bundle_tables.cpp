@@ -229,13 +229,13 @@ BundleSpec spec_of(const Line& line) {
   read_columns(line, spec);
   read_keys(line, spec);
   std::string head = "SELECT ";
-  bool with_cir = false;
   for (std::size_t i = 0; i < spec.columns.size(); ++i) {
     head += (i > 0 ? ", " : "") + spec.columns[i].select;
-    with_cir = with_cir || spec.columns[i].column.empty();
+    spec.with_cir = spec.with_cir || spec.columns[i].column.empty();
   }
-  head += " FROM " + spec.table.name + " t";
-  if (with_cir) head += " LEFT JOIN cir c ON c.range_id = t.range_id";
+  head += (spec.with_cir ? ", v.digest FROM " : " FROM ") + spec.table.name + " t";
+  if (spec.with_cir)
+    head += " LEFT JOIN cir c ON c.range_id = t.range_id LEFT JOIN cir_moved v ON v.range_id = t.range_id";
   spec.select = head + " WHERE " + line.where + " ORDER BY " + line.order;
   spec.find = find_text(spec, head);
   spec.insert = insert_text(spec);

@@ -40,6 +40,7 @@ struct BundleSpec {
   BundlePart part{};
   BundleTable table;
   std::vector<BundleColumnSql> columns;
+  bool with_cir{};                    ///< select and find give a last column: the digest of one in a file
   bool of_mission{};                  ///< has mission_key, which is always that of the flight
   std::vector<std::size_t> keys;      ///< columns that tell one row from another
   std::vector<std::string> nullable;  ///< of them, those that may be NULL

@@ -29,6 +29,7 @@ class DataFolder {
   std::filesystem::path database() const { return dir_ / "anchord.db"; }
   std::filesystem::path wal() const { return dir_ / "anchord.db-wal"; }
   std::filesystem::path backups() const { return dir_ / "backups"; }
+  std::filesystem::path cir_archive() const { return dir_ / "cir-archive"; }
 
   /// A database was made here once; from then on an empty or missing one is damage, never a fresh start.
   bool had_database() const;

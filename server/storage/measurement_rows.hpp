@@ -3,6 +3,7 @@
 #include "core/ports/measurement_limits.hpp"
 #include "core/types/fix.hpp"
 #include "core/types/range.hpp"
+#include "server/storage/cir_file.hpp"
 #include "server/storage/sql.hpp"
 
 /// Ranges and fixes as rows: texts, binding, reading, and what "the same content" means.
@@ -82,12 +83,19 @@ inline std::string thinned(std::string_view id) {
   return "0 = ((" + std::string(id) + " & 16777215) * 2654435761 >> 12 & 1048575) % ";
 }
 
-/// What a column dt_ps keeps; read_cir_columns() knows it.
+/// What a column dt_ps keeps, and what that means; read_cir_columns() knows it.
 double stored_dt_ps(const Cir& cir);
+double dt_ps_of_stored(double stored);
 /// Of a range with this key; the columns of k_cirs.
 void bind_cir(Query& query, std::int64_t range_id, const Cir& cir);
 inline constexpr BulkTable k_cirs{"cir", "range_id, dt_ps, first_path_idx, preamble_count, re_im"};
-std::optional<Cir> read_cir(Connection& connection, std::int64_t range_id);
+/// Of one range: in the database, or only that it is in a file. Neither: it has none.
+struct StoredCir {
+  std::optional<Cir> cir;
+  std::optional<CirDigest> moved;
+};
+StoredCir read_cir(Connection& connection, std::int64_t range_id);
+CirDigest read_digest(Query& query);
 /// dt_ps, first_path_idx, preamble_count, re_im.
 Cir read_cir_columns(Query& query);
 

@@ -117,8 +117,22 @@ void store_cirs(Connection& connection, const std::vector<Range>& rows, const st
   });
 }
 void store_cirs(Connection&, const std::vector<Fix>&, const std::vector<Known>&, const Connection::Keys&) {}
-void load_cir(Connection& connection, std::int64_t id, Range& row) { row.cir = read_cir(connection, id); }
-void load_cir(Connection&, std::int64_t, Fix&) {}
+/// As far as a comparison with `sent` needs it: of a response that is in a file the digest is enough.
+void load_cir_beside(Connection& connection, std::int64_t id, const Range& sent, Range& row) {
+  StoredCir stored = read_cir(connection, id);
+  row.cir = std::move(stored.cir);
+  if (stored.moved) row.cir = sent.cir && digest_of(*sent.cir) == *stored.moved ? sent.cir : Cir{};
+}
+void load_cir_beside(Connection&, std::int64_t, const Fix&, Fix&) {}
+Result<void> load_cir(Connection& connection, CirFinder& archive, std::int64_t id, Range& row) {
+  StoredCir stored = read_cir(connection, id);
+  row.cir = std::move(stored.cir);
+  if (stored.moved) {
+    BOOST_OUTCOME_TRY(row.cir, archive.find(row, *stored.moved));
+  }
+  return boost::outcome_v2::success();
+}
+Result<void> load_cir(Connection&, CirFinder&, std::int64_t, Fix&) { return boost::outcome_v2::success(); }
 
 template <class Row>
 RowOutcome judge_stored(Connection& connection, std::int64_t key, const Row& row) {
@@ -131,7 +145,7 @@ RowOutcome judge_stored(Connection& connection, std::int64_t key, const Row& row
   const std::int64_t id = query.integer();
   query.skip();
   Row stored = Table<Row>::read(query);
-  load_cir(connection, id, stored);
+  load_cir_beside(connection, id, row, stored);
   return same_content(stored, row) ? RowOutcome::duplicate : RowOutcome::conflict;
 }
 
@@ -332,7 +346,7 @@ Error gone(const MissionId& id) {
 }
 
 template <class Row>
-Result<MeasurementStore::Page<Row>> read_page(Connection& connection,
+Result<MeasurementStore::Page<Row>> read_page(Connection& connection, const CirFolder& files,
                                               const MeasurementStore::Filter& filter) {
   BOOST_OUTCOME_TRY(const auto cursor, parse_cursor(filter.after));
   MeasurementStore::Page<Row> page;
@@ -348,6 +362,7 @@ Result<MeasurementStore::Page<Row>> read_page(Connection& connection,
   // One more than asked tells whether there is a next page.
   query << row_limit(filter.limit) + 1;
   std::map<std::int64_t, MissionId> missions;
+  CirFinder archive(files);
   while (query.step()) {
     if (page.rows.size() == filter.limit) {
       if (filter.limit > 0)
@@ -360,14 +375,16 @@ Result<MeasurementStore::Page<Row>> read_page(Connection& connection,
     if (it == missions.end()) it = missions.emplace(row_key, mission_id(connection, row_key)).first;
     page.rows.push_back(Table<Row>::read(query));
     page.rows.back().mission = it->second;
-    if (filter.with_cir) load_cir(connection, page.ids.back(), page.rows.back());
+    if (filter.with_cir) {
+      BOOST_OUTCOME_TRYV(load_cir(connection, archive, page.ids.back(), page.rows.back()));
+    }
   }
   return page;
 }
 
 class SqlMeasurementStore final : public MeasurementStore {
  public:
-  explicit SqlMeasurementStore(Gate& gate) : gate_(gate) {}
+  SqlMeasurementStore(Gate& gate, const CirFolder& files) : gate_(gate), files_(files) {}
 
   Result<std::vector<RowOutcome>> append_ranges(std::vector<Range> rows, bool atomic) override {
     return append(gate_, rows, atomic);
@@ -376,10 +393,10 @@ class SqlMeasurementStore final : public MeasurementStore {
     return append(gate_, rows, atomic);
   }
   Result<Page<Range>> ranges(const Filter& filter) override {
-    return read_value<Page<Range>>(gate_, [&](Connection& c) { return read_page<Range>(c, filter); });
+    return read_value<Page<Range>>(gate_, [&](Connection& c) { return read_page<Range>(c, files_, filter); });
   }
   Result<Page<Fix>> fixes(const Filter& filter) override {
-    return read_value<Page<Fix>>(gate_, [&](Connection& c) { return read_page<Fix>(c, filter); });
+    return read_value<Page<Fix>>(gate_, [&](Connection& c) { return read_page<Fix>(c, files_, filter); });
   }
   Result<Range> range(std::int64_t id) override {
     return read_value<Range>(gate_, [&](Connection& c) -> Result<Range> {
@@ -393,7 +410,8 @@ class SqlMeasurementStore final : public MeasurementStore {
       const std::int64_t key = query.integer();
       Range row = Table<Range>::read(query);
       row.mission = mission_id(c, key);
-      row.cir = read_cir(c, id);
+      CirFinder archive(files_);
+      BOOST_OUTCOME_TRYV(load_cir(c, archive, id, row));
       return row;
     });
   }
@@ -451,12 +469,13 @@ class SqlMeasurementStore final : public MeasurementStore {
     });
   }
   Gate& gate_;
+  const CirFolder files_;
 };
 
 }  // namespace
 
-std::unique_ptr<MeasurementStore> make_measurement_store(Gate& gate) {
-  return std::make_unique<SqlMeasurementStore>(gate);
+std::unique_ptr<MeasurementStore> make_measurement_store(Gate& gate, const CirFolder& files) {
+  return std::make_unique<SqlMeasurementStore>(gate, files);
 }
 
 }  // namespace anchord::sql

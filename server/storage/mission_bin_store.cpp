@@ -21,7 +21,8 @@ constexpr const char* k_empty = "UPDATE mission_bin SET emptying = 1 WHERE missi
 constexpr const char* k_empty_before =
     "UPDATE mission_bin SET emptying = 1 WHERE emptying = 0 AND deleted_ran_ns < ?1 RETURNING mission_key";
 constexpr const char* k_emptying =
-    "SELECT mission_key FROM mission_bin WHERE emptying = 1 ORDER BY mission_key LIMIT 1";
+    "SELECT b.mission_key, m.id FROM mission_bin b JOIN mission m ON m.mission_key = b.mission_key WHERE "
+    "b.emptying = 1 ORDER BY b.mission_key LIMIT 1";
 // Children first and few at a time; the impulse responses go with their ranges.
 constexpr std::array k_rows{
     "DELETE FROM uwb_range WHERE range_id IN (SELECT range_id FROM uwb_range WHERE mission_key = ?1 LIMIT "
@@ -46,7 +47,7 @@ Error not_binned(const MissionId& id) {
 
 class SqlMissionBin final : public MissionBin {
  public:
-  explicit SqlMissionBin(Gate& gate) : gate_(gate) {}
+  SqlMissionBin(Gate& gate, const CirFolder& files) : gate_(gate), files_(files) {}
 
   Result<void> put(const MissionId& id, UtcTime now, std::int64_t ran_ns, std::string_view by) override {
     return write_void(gate_, [&](Connection& c) -> std::optional<Error> {
@@ -103,10 +104,13 @@ class SqlMissionBin final : public MissionBin {
   }
 
   Result<std::size_t> remove_rows(std::size_t most) override {
-    return write_value<std::size_t>(gate_, 1, [&](Connection& c) -> Result<std::size_t> {
+    std::optional<MissionId> gone;
+    const auto removed = write_value<std::size_t>(gate_, 1, [&](Connection& c) -> Result<std::size_t> {
+      gone.reset();
       Query next(c, k_emptying);
       if (!next.step()) return std::size_t{0};
       const std::int64_t key = next.integer();
+      const auto id = next.id<MissionId>();
       std::size_t n = 0;
       for (const char* text : k_rows) {
         if (n >= most) return n;
@@ -118,8 +122,11 @@ class SqlMissionBin final : public MissionBin {
       Query remove(c, k_remove);
       remove << key;
       remove.run();
+      gone = id;
       return n + 1;
     });
+    if (removed && gone) files_.remove_others(*gone, {});
+    return removed;
   }
 
  private:
@@ -138,6 +145,7 @@ class SqlMissionBin final : public MissionBin {
   }
 
   Gate& gate_;
+  const CirFolder files_;
 };
 
 class SqlServiceStore final : public ServiceStore {
@@ -185,7 +193,9 @@ class SqlServiceStore final : public ServiceStore {
 
 }  // namespace
 
-std::unique_ptr<MissionBin> make_mission_bin(Gate& gate) { return std::make_unique<SqlMissionBin>(gate); }
+std::unique_ptr<MissionBin> make_mission_bin(Gate& gate, const CirFolder& files) {
+  return std::make_unique<SqlMissionBin>(gate, files);
+}
 std::unique_ptr<ServiceStore> make_service_store(Gate& gate) {
   return std::make_unique<SqlServiceStore>(gate);
 }

@@ -36,7 +36,8 @@ class PostgresDatabase final : public Database {
               {options.writers, options.readers, options.max_queued_rows, options.max_queued_calls,
                options.statement_timeout}),
         // The disk is the database server's: whether a mission still fits, it says when it does not.
-        kept_(gate_, [] { return std::optional<Error>{}; }),
+        kept_(
+            gate_, [] { return std::optional<Error>{}; }, sql::CirFolder(folder_->cir_archive())),
         work_(sql::make_work_store(gate_)),
         watch_("anchord-dbwatch", [this] { watch(); }) {}
 
@@ -50,6 +51,7 @@ class PostgresDatabase final : public Database {
   }
 
   const Stores& stores() override { return kept_.ports; }
+  CirArchive& cir_archive() override { return *kept_.cir_archive; }
 
   /// Asks nobody: what the last calls met, and those of watch().
   StorageHealth health() override {

@@ -48,7 +48,8 @@ class SqliteDatabase final : public Database, private sql::Gate {
                  [this] { folder_->fill_reserve(options_.warn_free_bytes); }},
                 {options_.max_queued_rows, options_.max_queued_calls, options_.checkpoint_wal_bytes}),
         readers_([this] { return open_connection(Mode::read_only); }, options_.readers),
-        kept_(*this, [this] { return admit_mission(); }) {
+        kept_(
+            *this, [this] { return admit_mission(); }, sql::CirFolder(folder_->cir_archive())) {
     if (check_in_background) checker_ = Thread("anchord-check", [this] { check_in_background_thread(); });
   }
   ~SqliteDatabase() override {
@@ -56,6 +57,7 @@ class SqliteDatabase final : public Database, private sql::Gate {
   }
 
   const Stores& stores() override { return kept_.ports; }
+  CirArchive& cir_archive() override { return *kept_.cir_archive; }
 
   StorageHealth health() override {
     const auto status = writer_.status();

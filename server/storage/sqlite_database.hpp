@@ -13,6 +13,7 @@
 
 namespace anchord {
 
+class CirArchive;
 class WorkStore;
 
 /// What a commit waits for; docs/durability.md says what survives which accident.
@@ -76,6 +77,8 @@ class Database {
  public:
   virtual ~Database() = default;
   virtual const Stores& stores() = 0;
+  /// In the folder cir-archive of the data folder.
+  virtual CirArchive& cir_archive() = 0;
   virtual StorageHealth health() = 0;
   /// Online copy while writes go on: fsynced, integrity-checked, with its SHA-256. The file must not exist.
   virtual Result<BackupReport> backup(const std::filesystem::path& file) = 0;

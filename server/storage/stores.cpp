@@ -4,10 +4,10 @@
 
 namespace anchord::sql {
 
-SqlStores::SqlStores(Gate& gate, AdmitMission admit)
-    : measurements(make_measurement_store(gate)),
+SqlStores::SqlStores(Gate& gate, AdmitMission admit, const CirFolder& files)
+    : measurements(make_measurement_store(gate, files)),
       missions(make_mission_store(gate, std::move(admit))),
-      bin(make_mission_bin(gate)),
+      bin(make_mission_bin(gate, files)),
       exclusions(make_exclusion_store(gate)),
       events(make_event_store(gate)),
       sites(make_site_store(gate)),
@@ -28,7 +28,8 @@ SqlStores::SqlStores(Gate& gate, AdmitMission admit)
       service(make_service_store(gate)),
       webhooks(make_webhook_store(gate)),
       places(make_place_store(gate)),
-      bundles(make_bundle_store(gate)),
+      bundles(make_bundle_store(gate, files)),
+      cir_archive(make_cir_archive(gate, files, *measurements)),
       ports{*measurements, *missions, *bin,    *exclusions, *events,    *sites,    *anchors,  *calibrations,
             *revisions,    *kits,     *frames, *plans,      *campaigns, *labels,   *datasets, *training_runs,
             *models,       *jobs,     *tokens, *access,     *service,   *webhooks, *places,   *bundles} {}

@@ -7,6 +7,7 @@
 #include "core/ports/anchor_store.hpp"
 #include "core/ports/bundle_store.hpp"
 #include "core/ports/calibration_store.hpp"
+#include "core/ports/cir_archive.hpp"
 #include "core/ports/event_store.hpp"
 #include "core/ports/exclusion_store.hpp"
 #include "core/ports/frame_store.hpp"
@@ -23,6 +24,7 @@
 #include "core/ports/stores.hpp"
 #include "core/ports/token_store.hpp"
 #include "core/ports/webhook_store.hpp"
+#include "server/storage/cir_file.hpp"
 #include "server/storage/sql.hpp"
 
 /// The ports, written once for every database behind a Gate.
@@ -31,7 +33,7 @@ namespace anchord::sql {
 /// Empty, or why a new mission cannot be taken now (space).
 using AdmitMission = std::function<std::optional<Error>()>;
 
-std::unique_ptr<MeasurementStore> make_measurement_store(Gate& gate);
+std::unique_ptr<MeasurementStore> make_measurement_store(Gate& gate, const CirFolder& files = {});
 std::unique_ptr<MissionStore> make_mission_store(Gate& gate, AdmitMission admit);
 std::unique_ptr<SiteStore> make_site_store(Gate& gate);
 std::unique_ptr<AnchorStore> make_anchor_store(Gate& gate);
@@ -48,17 +50,21 @@ std::unique_ptr<DatasetStore> make_dataset_store(Gate& gate);
 std::unique_ptr<TrainingRunStore> make_training_run_store(Gate& gate);
 std::unique_ptr<ModelStore> make_model_store(Gate& gate);
 std::unique_ptr<PlanStore> make_plan_store(Gate& gate);
-std::unique_ptr<MissionBin> make_mission_bin(Gate& gate);
+std::unique_ptr<MissionBin> make_mission_bin(Gate& gate, const CirFolder& files = {});
 std::unique_ptr<ServiceStore> make_service_store(Gate& gate);
 std::unique_ptr<ExclusionStore> make_exclusion_store(Gate& gate);
 std::unique_ptr<EventStore> make_event_store(Gate& gate);
 std::unique_ptr<WebhookStore> make_webhook_store(Gate& gate);
 std::unique_ptr<PlaceStore> make_place_store(Gate& gate);
-std::unique_ptr<BundleStore> make_bundle_store(Gate& gate);
+std::unique_ptr<BundleStore> make_bundle_store(Gate& gate, const CirFolder& files = {});
+/// measurements: over the same gate and folder.
+std::unique_ptr<CirArchive> make_cir_archive(Gate& gate, const CirFolder& files,
+                                             MeasurementStore& measurements);
 
 /// All of them over one gate, which outlives them.
 struct SqlStores {
-  SqlStores(Gate& gate, AdmitMission admit);
+  /// files: of the impulse responses that are no longer in the database.
+  SqlStores(Gate& gate, AdmitMission admit, const CirFolder& files);
   const std::unique_ptr<MeasurementStore> measurements;
   const std::unique_ptr<MissionStore> missions;
   const std::unique_ptr<MissionBin> bin;
@@ -83,6 +89,7 @@ struct SqlStores {
   const std::unique_ptr<WebhookStore> webhooks;
   const std::unique_ptr<PlaceStore> places;
   const std::unique_ptr<BundleStore> bundles;
+  const std::unique_ptr<CirArchive> cir_archive;
   const Stores ports;
 };
 

@@ -561,6 +561,11 @@ test('what can be deleted', async () => {
     json: { action: 'take_devices', lease: 'x', no_such_field: 1 },
   });
   await call('POST', `${spare}/actions`, { expect: 200, json: { action: 'finish' } });
+  const move = async (to) =>
+    (await call('POST', `${spare}/cir-archive`, { expect: 200, headers: { prefer: 'wait=60' }, json: { to } })).json;
+  assert.equal((await move('file')).n_moved, 1);
+  assert.equal((await call('GET', '/api/v1/cir-archive', { expect: 200 })).json.items[0].mission, ids.spare);
+  assert.equal((await move('database')).n_moved, 0);
   await call('DELETE', spare, { expect: 428 });
   await call('DELETE', spare, { expect: 412, headers: { 'if-match': '"m-0"' } });
   await call('DELETE', spare, { expect: 204, headers: { 'if-match': await etag(spare) } });

@@ -92,6 +92,18 @@ TEST(Config, ShowsNoPasswordOfADatabaseItRefuses) {
   EXPECT_THAT(config.error().message, testing::Not(testing::HasSubstr("secret")));
 }
 
+TEST(Config, TakesDaysOfRetentionOrOff) {
+  const auto days = [](const std::string& text) {
+    return load_config({{"missions.keep_cir_days", text}}, std::nullopt, {});
+  };
+  EXPECT_EQ(load_config({}, std::nullopt, {}).value().text("missions.keep_cir_days"), "off");
+  EXPECT_EQ(days("90").value().count("missions.keep_cir_days"), 90u);
+  EXPECT_EQ(days("off").value().count("missions.keep_cir_days"), 0u);
+  for (const char* wrong : {"0", "1.5", "-1", "on", "", "36501"})
+    EXPECT_THAT(days(wrong).error().message, testing::HasSubstr("must be off, or a whole number of days"))
+        << wrong;
+}
+
 TEST(Config, EveryDefaultIsValid) { EXPECT_TRUE(load_config({}, std::nullopt, {})); }
 
 TEST(Listeners, SpeakTlsWhenThereIsACertificateButForThoseThatSayOtherwise) {

@@ -1,8 +1,4 @@
 // A flight as rows for another server, over every backend, and from each to SQLite and back.
-#include "core/ports/bundle_store.hpp"
-
-#include <map>
-
 #include "core/ports/anchor_store.hpp"
 #include "core/ports/exclusion_store.hpp"
 #include "core/ports/frame_store.hpp"
@@ -10,34 +6,10 @@
 #include "core/ports/revision_store.hpp"
 #include "core/ports/site_store.hpp"
 #include "tests/server/storage/backends.hpp"
+#include "tests/server/storage/bundle_rows.hpp"
 
 namespace anchord {
 namespace {
-
-/// Rows in memory, in and out.
-struct Rows final : BundleSink, BundleSource {
-  std::map<std::string, std::vector<BundleRow>> tables;
-  std::string name;
-  std::size_t at{0};
-  Result<void> begin(const BundleTable& table) override {
-    tables[name = table.name];
-    return boost::outcome_v2::success();
-  }
-  Result<void> row(const BundleRow& row) override {
-    tables[name].push_back(row);
-    return boost::outcome_v2::success();
-  }
-  Result<void> open(const BundleTable& table) override {
-    name = table.name;
-    at = 0;
-    return boost::outcome_v2::success();
-  }
-  Result<bool> next(BundleRow& row) override {
-    if (at >= tables[name].size()) return false;
-    row = tables[name][at++];
-    return true;
-  }
-};
 
 class BundleStoreContract : public StoreContract {
  protected:
@@ -89,8 +61,8 @@ class BundleStoreContract : public StoreContract {
     for (const auto& one : outcome.left_out) out.push_back(one.what + ": " + one.why);
     return out;
   }
-  static Rows written(Database& db, const MissionId& mission) {
-    Rows rows;
+  static BundleRows written(Database& db, const MissionId& mission) {
+    BundleRows rows;
     const auto done = db.stores().bundles.write_out(mission, rows);
     EXPECT_TRUE(done) << done.error().message;
     return rows;
@@ -99,7 +71,7 @@ class BundleStoreContract : public StoreContract {
 
 TEST_P(BundleStoreContract, ComeBackTheSameFromAnotherDatabase) {
   const auto mission = flown();
-  Rows rows = written(*db_, mission);
+  BundleRows rows = written(*db_, mission);
   EXPECT_EQ(rows.tables.at("uwb_range").size(), 40u);
   EXPECT_EQ(rows.tables.at("exclusion_taken_back").size(), 1u);
   EXPECT_EQ(rows.tables.at("revision_position").size(), 1u);
@@ -116,7 +88,7 @@ TEST_P(BundleStoreContract, ComeBackTheSameFromAnotherDatabase) {
 
 TEST_P(BundleStoreContract, HaveALeverArmSigmaWithinItsLimitsOrNone) {
   const auto mission = flown();
-  Rows rows = written(*db_, mission);
+  BundleRows rows = written(*db_, mission);
   BundleCell& sigma = rows.tables["mission"][0].back();
   EXPECT_EQ(sigma, BundleCell{0.1 / 3});
   ScratchDir folder;
@@ -138,7 +110,7 @@ TEST_P(BundleStoreContract, AreTakenFromSqlite) {
   ScratchDir folder;
   db_ = open_sqlite(folder.path() / "data");
   const auto mission = flown();
-  Rows rows = written(*db_, mission);
+  BundleRows rows = written(*db_, mission);
   const auto taken = here->stores().bundles.take_in(mission, rows);
   ASSERT_TRUE(taken) << taken.error().message;
   EXPECT_EQ(written(*here, mission).tables, rows.tables);
@@ -146,7 +118,7 @@ TEST_P(BundleStoreContract, AreTakenFromSqlite) {
 
 TEST_P(BundleStoreContract, AreRefusedWholeWhereAMeasurementDiffers) {
   const auto mission = flown();
-  Rows rows = written(*db_, mission);
+  BundleRows rows = written(*db_, mission);
   rows.tables["uwb_range"].pop_back();
   const auto fewer = db_->stores().bundles.take_in(mission, rows);
   ASSERT_FALSE(fewer);
@@ -163,9 +135,9 @@ TEST_P(BundleStoreContract, AreRefusedWholeWhereAMeasurementDiffers) {
 // (t_ns)".
 TEST_P(BundleStoreContract, OfALaterFlightOfTheKitComeWhereTheProfileIsTheSameOrAnother) {
   const auto first = flown();
-  Rows of_first = written(*db_, first);
+  BundleRows of_first = written(*db_, first);
   const auto second = flown(1);
-  Rows of_second = written(*db_, second);
+  BundleRows of_second = written(*db_, second);
   ScratchDir same, other;
   const auto follows = open_sqlite(same.path() / "data"), learns = open_sqlite(other.path() / "data");
   for (Database* db : {follows.get(), learns.get()})
@@ -201,7 +173,7 @@ TEST_P(BundleStoreContract, LeaveSitesFramesAndAnchorsAsTheyAreHere) {
   frame.site = site.id;
   frame.created = k_noon;
   ASSERT_TRUE(from.frames.insert(frame));
-  Rows rows = written(*db_, mission);
+  BundleRows rows = written(*db_, mission);
   ScratchDir folder;
   const auto other = open_sqlite(folder.path() / "data");
   const Stores here = other->stores();
@@ -224,7 +196,7 @@ TEST_P(BundleStoreContract, LeaveSitesFramesAndAnchorsAsTheyAreHere) {
 }
 
 TEST_P(BundleStoreContract, AreOfFinishedMissionsAlone) {
-  Rows rows;
+  BundleRows rows;
   const auto records = db_->stores().bundles.write_out(stored_mission().id, rows);
   ASSERT_FALSE(records);
   EXPECT_EQ(records.error().code, Errc::conflict);
