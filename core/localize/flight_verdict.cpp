@@ -75,11 +75,16 @@ std::vector<Mirror> mirrors_of(const FlightRows& flight, const JointFit& fit, st
   const double unit =
       static_cast<double>(block.n_in_track) / (static_cast<double>(rows.size()) * block.kappa);
   settings.bias_prior_sigma_m = options.delay_prior_m * std::sqrt(unit);
+  // Where a start came near to where one before it did, it would end there too.
+  std::vector<Eigen::Vector3d> rough_m;
   const auto polish = [&](const Eigen::Vector3d& start) -> std::optional<AnchorMinimum> {
     settings.loss = Loss::cauchy;
     settings.loss_sigmas = 2.0;
     const auto rough = descend_to_minimum(rows, start, settings);
     if (!rough) return std::nullopt;
+    const auto known = [&](const Eigen::Vector3d& p) { return (rough.value().position_m - p).norm() < 1e-4; };
+    if (std::ranges::any_of(rough_m, known)) return std::nullopt;
+    rough_m.push_back(rough.value().position_m);
     settings.loss = options.loss;
     settings.loss_sigmas =
         default_bend(options.loss) * (options.loss == Loss::tukey ? options.mad_factor : 1.0);

@@ -5,10 +5,12 @@
 #include <cmath>
 #include <map>
 #include <optional>
+#include <span>
 #include <utility>
 
 #include "core/base/median.hpp"
 #include "core/localize/error_model_likelihood.hpp"
+#include "core/localize/joint_lines.hpp"
 #include "core/localize/residual.hpp"
 
 namespace anchord {
@@ -19,10 +21,10 @@ constexpr double k_least_slow_m = 0.05;   // no radio in the air was seen with l
 constexpr double k_believed_white = 0.9;  // the share is an estimate; too much of it claims too much
 
 /// Time the rows cover, pauses of more than 2 s left out.
-double duration_s(const std::vector<double>& times_s) {
+double duration_s(std::span<const JointRow* const> rows) {
   double sum_s = 0;
-  for (std::size_t i = 1; i < times_s.size(); ++i) {
-    const double step_s = times_s[i] - times_s[i - 1];
+  for (std::size_t i = 1; i < rows.size(); ++i) {
+    const double step_s = rows[i]->t_s - rows[i - 1]->t_s;
     if (step_s <= 2.0) sum_s += step_s;
   }
   return std::max(sum_s, 1.0);
@@ -32,6 +34,7 @@ double duration_s(const std::vector<double>& times_s) {
 /// antenna by itself; without enough neighbours within half a second nothing is known, and nothing claimed.
 class Neighbours {
  public:
+  explicit Neighbours(std::size_t most) { jumps_m_.reserve(most); }
   void add(const JointRow& row, double residual_m) {
     const std::pair antenna{row.tag, row.antenna};
     if (!newest_ || newest_->first != antenna) newest_ = &*last_.try_emplace(antenna).first;
@@ -56,21 +59,20 @@ class Neighbours {
 /// Larger ones make the slope of the likelihood vary more than its curvature allows, and the covariance is
 /// then that of a misspecified likelihood, H^-1 J H^-1 (Huber 1967; White 1982), by one number for the
 /// anchor.
-double believed_share(const std::vector<JointLine>& lines,
-                      const std::vector<const RangeErrorModel*>& error_models) {
+double believed_share(const JointLines& lines) {
   constexpr double step_m = 1e-3, allowed = 1.2;  // H and J are sums of some hundred terms: 20 % is chance
   double curvature = 0, variance = 0, claimed = 0;
   for (std::size_t i = 0; i < lines.size(); ++i) {
-    if (!error_models[i]) continue;
+    const RangeErrorModel* model = lines.rows()[i]->error_model;
+    if (!model) continue;
+    const double residual_m = lines.of(JointLines::residual)[i];
     const auto at = [&](double error_m) {
-      return error_model_value(*error_models[i], error_m, lines[i].position_variance_m2);
+      return error_model_value(*model, error_m, lines.of(JointLines::variance)[i]);
     };
-    const ErrorModelValue here = at(lines[i].residual_m);
+    const ErrorModelValue here = at(residual_m);
     claimed += here.information_per_m2;
     variance += here.score_per_m * here.score_per_m;
-    curvature +=
-        (at(lines[i].residual_m + step_m).score_per_m - at(lines[i].residual_m - step_m).score_per_m) /
-        (2 * step_m);
+    curvature += (at(residual_m + step_m).score_per_m - at(residual_m - step_m).score_per_m) / (2 * step_m);
   }
   if (!(claimed > 0)) return 1.0;
   curvature = std::max(curvature, 1e-3 * claimed);
@@ -90,106 +92,6 @@ struct AnchorTask {
   bool claims{};            ///< information as it is claimed in the end, not as the search needs it
 };
 
-/// Weighted sums of products of what the lines of one antenna hold. The derivatives by bias and delay are 1,
-/// and an antenna's own arm is seen as the common one is: each product is summed once, over four lines at a
-/// time, in the same order whatever registers a machine has.
-class LineSums {
- public:
-  void add(const JointLine& line, double weight) {
-    const SharedVector& s = line.by_shared;
-    const std::array<double, k_columns> values{
-        line.by_anchor[0], line.by_anchor[1], line.by_anchor[2], 1.0,
-        s[k_shared_curve], s[k_shared_lag],   s[k_shared_lever], s[k_shared_forward],
-        s[k_shared_left],  line.residual_m};
-    for (std::size_t i = 0; i < k_columns; ++i) columns_[i][n_] = values[i];
-    weight_[n_] = weight;
-    if (++n_ == k_lanes) sum();
-  }
-  /// Into the blocks; arm: of the antenna, if it has one of its own.
-  void add_to(std::optional<int> arm, AnchorBlock& block, JointNormal& normal) {
-    sum();
-    const Eigen::Matrix<double, k_columns, k_columns> all = totals();
-    constexpr std::array own{0, 1, 2, 3};
-    constexpr int residual = k_columns - 1;
-    static_assert(k_shared_bias == 0 && k_shared_left == 5 && k_shared_antennas == 6);
-    // Column of the sums that each shared unknown has.
-    std::array<int, k_shared_size> column{3, 4, 5, 6, 7, 8, -1, -1, -1, -1};
-    if (arm) column[static_cast<std::size_t>(k_shared_antennas + *arm)] = 6;
-    block.own += all.topLeftCorner<4, 4>();
-    block.gradient += all.block<4, 1>(0, residual);
-    for (int j = 0; j < k_shared_size; ++j) {
-      const int cj = column[static_cast<std::size_t>(j)];
-      if (cj < 0) continue;
-      for (const int i : own) block.shared(i, j) += all(i, cj);
-      normal.shared_gradient[j] += all(cj, residual);
-      for (int i = 0; i < k_shared_size; ++i) {
-        const int ci = column[static_cast<std::size_t>(i)];
-        if (ci >= 0) normal.shared(i, j) += all(ci, cj);
-      }
-    }
-  }
-
- private:
-  static constexpr std::size_t k_lanes = 4, k_columns = 10, k_products = k_columns * (k_columns + 1) / 2;
-  using Four = double __attribute__((vector_size(k_lanes * sizeof(double))));
-
-  /// The lines gathered; where they are fewer than four the rest weighs nothing.
-  void sum() {
-    for (; n_ > 0 && n_ < k_lanes; ++n_) weight_[n_] = 0;
-    if (n_ > 0) (k_avx2 ? add_products_avx2 : add_products)(*this);
-    n_ = 0;
-  }
-  __attribute__((always_inline)) static inline void add_all_products(LineSums& of) {
-    const Four* columns = of.columns_.data();
-    Four* product = of.sums_.data();
-    for (std::size_t i = 0; i < k_columns; ++i) {
-      const Four weighed = of.weight_ * columns[i];
-      for (std::size_t j = i; j < k_columns; ++j) *product++ += weighed * columns[j];
-    }
-  }
-  static void add_products(LineSums& of) { add_all_products(of); }
-#if defined(__x86_64__)
-  __attribute__((target("avx2"))) static void add_products_avx2(LineSums& of) { add_all_products(of); }
-  inline static const bool k_avx2 = __builtin_cpu_supports("avx2") != 0;
-#else
-  static constexpr bool k_avx2 = false;
-  static constexpr auto add_products_avx2 = add_products;
-#endif
-  Eigen::Matrix<double, k_columns, k_columns> totals() const {
-    Eigen::Matrix<double, k_columns, k_columns> out;
-    std::size_t product = 0;
-    for (int i = 0; i < static_cast<int>(k_columns); ++i)
-      for (int j = i; j < static_cast<int>(k_columns); ++j) {
-        const Four& s = sums_[product++];
-        out(i, j) = out(j, i) = (s[0] + s[1]) + (s[2] + s[3]);
-      }
-    return out;
-  }
-
-  // As a template's argument Four loses the alignment that its loads rely on.
-  alignas(k_lanes * sizeof(double)) std::array<Four, k_columns> columns_{};
-  Four weight_{};
-  std::size_t n_{0};
-  alignas(k_lanes * sizeof(double)) std::array<Four, k_products> sums_{};
-};
-
-static_assert(alignof(LineSums) == 32, "AVX2 reads its columns in place");
-
-/// Antennas with arms of their own each by themselves, and all others together.
-void add_lines(const std::vector<JointLine>& lines, const std::vector<double>& weights,
-               const std::vector<const JointRow*>& rows, double unit, AnchorBlock& block,
-               JointNormal& normal) {
-  std::vector<LineSums> sums(1);
-  for (std::size_t i = 0; i < lines.size(); ++i) {
-    if (weights[i] <= 0) continue;
-    const std::size_t arm = rows[i]->arm ? static_cast<std::size_t>(*rows[i]->arm) + 1 : 0;
-    if (arm >= sums.size()) sums.resize(arm + 1);
-    sums[arm].add(lines[i], weights[i] * unit);
-  }
-  for (std::size_t arm = 0; arm < sums.size(); ++arm)
-    sums[arm].add_to(arm > 0 ? std::optional{static_cast<int>(arm) - 1} : std::nullopt, block, normal);
-}
-
 /// Scatter of the ranges kept. Jumps to those that are off by metres, and the scale they blow up, are no
 /// noise: taken for it they would make spoilt ranges count for more than clean ones.
 double kept_variance_m2(std::vector<double>& kept_sizes_m, double scale_m, double min_scale_m) {
@@ -197,90 +99,101 @@ double kept_variance_m2(std::vector<double>& kept_sizes_m, double scale_m, doubl
   return std::clamp(kept_m * kept_m, min_scale_m * min_scale_m, scale_m * scale_m);
 }
 
-void build_anchor(const AnchorTask& task, AnchorBlock& block, JointNormal& normal) {
+/// Sigmas where the loss bends.
+double bend_of(const FlightOptions& options) {
+  return default_bend(options.loss) * (options.loss == Loss::tukey ? options.mad_factor : 1.0);
+}
+
+/// What the robust loss makes of rows without an error model, beside what widens them.
+std::vector<double> robust_weights(const AnchorTask& task, const AnchorBlock& block,
+                                   const JointLines& lines) {
   const FlightOptions& options = task.options;
-  std::vector<JointLine> lines;
-  std::vector<double> sizes, centred_of_m, times_s, position_variances;
-  std::vector<const RangeErrorModel*> error_models;
-  std::vector<const JointRow*> placed;
-  lines.reserve(task.rows.rows.size());
-  for (const JointRow& row : task.rows.rows) {
-    JointLine line = linearise(task.flight.track, row, task.shared, task.anchor);
-    if (line.refused != TrackRefusal::none) {
-      ++block.refused[std::string(to_string(line.refused))];
-      continue;
-    }
-    const double centred_m = line.residual_m - (row.error_model ? expected_error_m(*row.error_model) : 0.0);
-    sizes.push_back(std::abs(centred_m));
-    error_models.push_back(row.error_model);
-    placed.push_back(&row);
-    centred_of_m.push_back(centred_m);
-    times_s.push_back(row.t_s);
-    position_variances.push_back(line.position_variance_m2);
-    block.last_t_s = std::max(block.last_t_s, row.t_s);
-    lines.push_back(std::move(line));
-  }
-  block.n_in_track = lines.size();
-  if (lines.empty()) return;
-  // The MAD holds the usual position error already; only what a row has beyond that makes it count less.
-  const double usual_variance_m2 = upper_median(position_variances);
-  block.usual_position_variance_m2 = usual_variance_m2;
-  block.scale_m = task.kept_scale_m > 0
-                      ? task.kept_scale_m
-                      : std::max({1.4826 * upper_median(sizes), options.min_scale_m, task.scale_floor_m});
   const double scale2 = block.scale_m * block.scale_m;
-  const double believed = task.claims ? believed_share(lines, error_models) : 1.0;
+  if (options.loss == Loss::tukey && options.weights != Weights::as_printed)
+    return tukey_weights(lines, scale2, block.usual_position_variance_m2, bend_of(options));
+  std::vector<double> out(lines.size());
+  for (std::size_t i = 0; i < out.size(); ++i) {
+    const double beyond_m2 = lines.of(JointLines::variance)[i] - block.usual_position_variance_m2;
+    const double widening = (scale2 + std::max(beyond_m2, 0.0)) / scale2;
+    const double residual_m = lines.of(JointLines::residual)[i];
+    out[i] = robust_weight(residual_m / (block.scale_m * std::sqrt(widening)), options) / widening;
+    if (options.weights == Weights::as_printed)
+      out[i] *= std::sqrt(widening) * block.scale_m / task.common_scale_m;
+  }
+  return out;
+}
+
+/// Weights of all rows, and what they sum to in the block. A residual becomes what its row pulls with.
+std::vector<double> weigh(const AnchorTask& task, JointLines& lines, AnchorBlock& block) {
+  const double scale2 = block.scale_m * block.scale_m;
+  const double believed = task.claims ? believed_share(lines) : 1.0;
+  std::vector<double> weights = robust_weights(task, block, lines);
   double sum_square = 0;
-  Neighbours neighbours;
-  std::vector<double> weights, kept_sizes;
-  weights.reserve(lines.size());
   for (std::size_t i = 0; i < lines.size(); ++i) {
-    JointLine& line = lines[i];
-    double weight = 0, counted = 0, counted_m = line.residual_m;
-    if (error_models[i]) {
+    double& residual_m = lines.of(JointLines::residual)[i];
+    double counted = weights[i], counted_m = residual_m;
+    if (const RangeErrorModel* model = lines.rows()[i]->error_model) {
       // Where a model spoke, its likelihood takes the place of scale and loss; the pull is its exact slope.
-      const ErrorModelValue value =
-          error_model_value(*error_models[i], line.residual_m, line.position_variance_m2);
-      weight = (task.claims ? value.information_per_m2 : value.curvature_per_m2) * scale2;
+      const ErrorModelValue value = error_model_value(*model, residual_m, lines.of(JointLines::variance)[i]);
+      const double weight = (task.claims ? value.information_per_m2 : value.curvature_per_m2) * scale2;
       counted = value.p_los;
-      counted_m -= error_models[i]->los_bias_m;
-      line.residual_m = weight > 0 ? value.score_per_m * scale2 / weight : 0.0;
-      weight *= believed;
-    } else {
-      const double widening =
-          (scale2 + std::max(line.position_variance_m2 - usual_variance_m2, 0.0)) / scale2;
-      weight = robust_weight(line.residual_m / (block.scale_m * std::sqrt(widening)), options) / widening;
-      if (options.weights == Weights::as_printed)
-        weight *= std::sqrt(widening) * block.scale_m / task.common_scale_m;
-      counted = weight;
+      counted_m -= model->los_bias_m;
+      residual_m = weight > 0 ? value.score_per_m * scale2 / weight : 0.0;
+      weights[i] = weight * believed;
     }
-    weights.push_back(weight);
     block.sum_weight += counted;
     sum_square += counted * counted_m * counted_m;
-    if (weight > 0) {
-      ++block.n_used;
-      neighbours.add(*placed[i], centred_of_m[i]);
-      kept_sizes.push_back(std::abs(centred_of_m[i]));
-    } else {
-      ++block.n_rejected;
-    }
   }
-  if (block.n_rejected > 0) block.refused["outlier"] = block.n_rejected;
   if (block.sum_weight > 0) block.rms_m = std::sqrt(sum_square / block.sum_weight);
-  const double alike = std::max(1.0, 2.0 * options.correlation_s * block.sum_weight / duration_s(times_s));
+  return weights;
+}
+
+void build_anchor(const AnchorTask& task, AnchorBlock& block, JointNormal& normal) {
+  const FlightOptions& options = task.options;
+  JointLines lines(task.flight.track, task.rows.rows, task.shared, task.anchor);
+  for (std::size_t why = 0; why < lines.refused().size(); ++why)
+    if (lines.refused()[why] > 0)
+      block.refused[std::string(to_string(static_cast<TrackRefusal>(why)))] += lines.refused()[why];
+  block.n_in_track = lines.size();
+  if (lines.size() == 0) return;
+  block.last_t_s = std::max(block.last_t_s, lines.rows().back()->t_s);
+  std::vector<double> centred_m, sorted;
+  centred_m.assign(lines.of(JointLines::residual).begin(), lines.of(JointLines::residual).end());
+  for (std::size_t i = 0; i < centred_m.size(); ++i)
+    if (const RangeErrorModel* model = lines.rows()[i]->error_model) centred_m[i] -= expected_error_m(*model);
+  // The MAD holds the usual position error already; only what a row has beyond that makes it count less.
+  sorted.assign(lines.of(JointLines::variance).begin(), lines.of(JointLines::variance).end());
+  block.usual_position_variance_m2 = upper_median(sorted);
+  block.scale_m = task.kept_scale_m;
+  if (!(task.kept_scale_m > 0)) {
+    std::ranges::transform(centred_m, sorted.begin(), [](double v) { return std::abs(v); });
+    block.scale_m = std::max({1.4826 * upper_median(sorted), options.min_scale_m, task.scale_floor_m});
+  }
+  const std::vector<double> weights = weigh(task, lines, block);
+  Neighbours neighbours(lines.size());
+  sorted.clear();
+  for (std::size_t i = 0; i < lines.size(); ++i) {
+    if (!(weights[i] > 0)) continue;
+    neighbours.add(*lines.rows()[i], centred_m[i]);
+    sorted.push_back(std::abs(centred_m[i]));
+  }
+  block.n_used = sorted.size();
+  block.n_rejected = lines.size() - block.n_used;
+  if (block.n_rejected > 0) block.refused["outlier"] = block.n_rejected;
+  const double alike =
+      std::max(1.0, 2.0 * options.correlation_s * block.sum_weight / duration_s(lines.rows()));
   // The mean over a correlation time keeps what is shared and averages the rest.
-  block.white_share = neighbours.white_share(scale2);
+  block.white_share = neighbours.white_share(block.scale_m * block.scale_m);
   const double slow_share =
-      k_least_slow_m * k_least_slow_m / kept_variance_m2(kept_sizes, block.scale_m, options.min_scale_m);
+      k_least_slow_m * k_least_slow_m / kept_variance_m2(sorted, block.scale_m, options.min_scale_m);
   block.kappa = 1.0 + (alike - 1.0) * std::clamp(slow_share, 1.0 - k_believed_white * block.white_share, 1.0);
-  add_lines(lines, weights, placed, 1.0 / (block.kappa * scale2), block, normal);
+  add_lines(lines, weights, 1.0 / (block.kappa * block.scale_m * block.scale_m), block, normal);
 }
 
 }  // namespace
 
 double robust_weight(double residual_over_scale, const FlightOptions& options) {
-  const double bend = default_bend(options.loss) * (options.loss == Loss::tukey ? options.mad_factor : 1.0);
-  return loss_value(options.loss, bend, residual_over_scale).weight;
+  return loss_value(options.loss, bend_of(options), residual_over_scale).weight;
 }
 
 AnchorPriors priors_of(NetworkId id, const FlightOptions& options) {

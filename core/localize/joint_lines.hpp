@@ -1,0 +1,52 @@
+#pragma once
+
+#include <array>
+#include <span>
+#include <vector>
+
+#include "core/localize/joint_model.hpp"
+
+namespace anchord {
+
+/// The rows of one anchor as linearise() has each of them, every number of theirs side by side, so that the
+/// arithmetic is on four rows at a time. The order of all operations is fixed, whatever registers a machine
+/// has.
+class JointLines {
+ public:
+  /// The derivatives by bias and delay are 1; an antenna's own arm is seen as the common one is.
+  enum Column : std::size_t { x, y, z, curve, lag, lever, forward, left, residual, variance, n_columns };
+
+  JointLines(const TagTrack& track, std::span<const JointRow> rows, const SharedVector& shared,
+             const JointState::Anchor& anchor);
+
+  std::size_t size() const { return rows_.size(); }
+  /// Those that the track has a place for, in their order.
+  std::span<const JointRow* const> rows() const { return rows_; }
+  std::span<const double> of(Column column) const { return {begin(column), size()}; }
+  std::span<double> of(Column column) { return {values_.data() + column * padded_, size()}; }
+  /// The others by TrackRefusal.
+  const std::array<std::size_t, 4>& refused() const { return refused_; }
+  /// As many as there are rows in whole groups of four.
+  std::size_t padded() const { return padded_; }
+  const double* begin(Column column) const { return values_.data() + column * padded_; }
+
+ private:
+  std::vector<const JointRow*> rows_;
+  std::size_t padded_{};
+  std::vector<double> values_;
+  std::array<std::size_t, 4> refused_{};
+};
+
+/// Weights by Tukey's loss of rows without an error model.
+/// variance_m2  that residuals are held against
+/// usual_m2     variance of the track that is in it
+/// cut_off      sigmas from where on a row weighs nothing
+std::vector<double> tukey_weights(const JointLines& lines, double variance_m2, double usual_m2,
+                                  double cut_off);
+
+/// Adds the weighted sums of products of the lines to the blocks.
+/// weights  one for each row, all times `unit`
+void add_lines(const JointLines& lines, std::span<const double> weights, double unit, AnchorBlock& block,
+               JointNormal& normal);
+
+}  // namespace anchord
