@@ -452,9 +452,14 @@ class Reader {
   /// here stays, and the flight comes all the same.
   Result<void> stays(const BundleSpec& spec, const BundleRow& row, const std::string& column) {
     const std::string what = name_of(spec, row);
+    // What was declared of a flight may have been corrected on one of the two servers.
+    const std::string remedy =
+        spec.table.name == "mission"
+            ? "; correct it here as it was there (PATCH /missions/{id}) and import again"
+            : "";
     if (!is_edited(spec.part))
       return make_error(Errc::conflict, what + " exists on this server with other content (" + column +
-                                            "); nothing was imported");
+                                            "); nothing was imported" + remedy);
     if (spec.table.name == "anchor") anchors_out_.insert(row[0]);
     out_.left_out.push_back(
         {what, "it exists on this server with other content (" + column + "), which stays"});
