@@ -8,6 +8,7 @@
 #include "api/admin/routes.hpp"
 #include "api/admin/support_bundle.hpp"
 #include "api/kit/contract.hpp"
+#include "api/kit/current_sites.hpp"
 #include "api/kit/html_page.hpp"
 #include "api/kit/support.hpp"
 #include "api/stream/hub.hpp"
@@ -43,19 +44,22 @@ Response version(AdminApi& s, const Request&) {
 Response system(AdminApi& s, const Request&) {
   const StorageStatus storage = s.storage();
   const ServerCounts counts = s.counts();
-  return json_response(200, {{"t_us", s.clock.now().us()},
-                             {"recording", counts.recording},
-                             {"queue_depth", storage.queue_depth + counts.queued_rows},
-                             {"db_bytes", storage.db_bytes},
-                             {"disk_free_bytes", storage.disk_free_bytes},
-                             {"ws_clients", s.hub.clients()},
-                             {"synchronous", storage.synchronous},
-                             {"writable", storage.writable},
-                             {"reason", storage.reason},
-                             {"clock", s.device_clock()},
-                             {"drone", s.drone()},
-                             {"mqtt", s.mqtt()},
-                             {"cir_archive", s.cir_retention.status()}});
+  Ordered body{{"t_us", s.clock.now().us()},
+               {"recording", counts.recording},
+               {"queue_depth", storage.queue_depth + counts.queued_rows},
+               {"db_bytes", storage.db_bytes},
+               {"disk_free_bytes", storage.disk_free_bytes},
+               {"ws_clients", s.hub.clients()},
+               {"synchronous", storage.synchronous},
+               {"writable", storage.writable},
+               {"reason", storage.reason}};
+  // As topic `system` has it; which aircraft, broker and flights there are beside is not for who is bound.
+  if (!current_sites().all()) return json_response(200, body);
+  body["clock"] = s.device_clock();
+  body["drone"] = s.drone();
+  body["mqtt"] = s.mqtt();
+  body["cir_archive"] = s.cir_retention.status();
+  return json_response(200, body);
 }
 
 Response metrics(AdminApi& s, const Request&) {

@@ -197,7 +197,7 @@ constexpr auto k_routes = std::to_array<RouteSites>({
     {get, "/api/v1/floors/{id}/walls", stored},
     {put, "/api/v1/floors/{id}/walls", stored},
     {get, "/api/v1/audit", refused},
-    {get, "/api/v1/system", refused},
+    {get, "/api/v1/system", stored},
     {get, "/api/v1/ws", open},
     {get, "/api/v1/backups", refused},
     {post, "/api/v1/backups", refused},

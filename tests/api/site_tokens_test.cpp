@@ -223,6 +223,16 @@ TEST_F(SiteTokenRoutes, WhatHasNoSiteIsForTokensOfEverySite) {
   EXPECT_EQ(json(get_as(alpha_, "/api/v1/missions"))["items"].size(), 1u);
 }
 
+TEST_F(SiteTokenRoutes, SystemSaysOfTheWholeServerWhatItsLiveTopicSays) {
+  const Json all = json(get("/api/v1/system")), bound = json(get_as(alpha_, "/api/v1/system"));
+  for (const char* of_the_server : {"clock", "drone", "mqtt", "cir_archive"}) {
+    EXPECT_TRUE(all.contains(of_the_server));
+    EXPECT_FALSE(bound.contains(of_the_server)) << bound;
+  }
+  for (const char* shared : {"writable", "reason", "disk_free_bytes", "queue_depth", "recording"})
+    EXPECT_TRUE(bound.contains(shared)) << bound;
+}
+
 TEST_F(SiteTokenRoutes, NothingIsWrittenOfOrIntoAnotherSite) {
   const auto refused = [&](const std::string& path, const Json& body) {
     const auto answer = post_as(bravo_, path, body);
