@@ -148,6 +148,7 @@ set(mutexes
   api/devices/device_stream.hpp:changing_         # whose the devices are: told to them and to the disk
   api/flight/flight_state.hpp:publishing_         # events of a flight, in their order
   api/learning/model_registry.hpp:reloading_      # the promoted models
+  api/missions/mission_service_state.hpp:correcting_one  # what was declared of a mission, read and written
   api/missions/mission_service_state.hpp:reading_one  # a flight read back from the store
   api/webhooks/webhook_service.hpp:starting_      # the threads of webhooks: begun or joined
   server/runtime/backup_keeper.hpp:making_        # a backup

@@ -16,8 +16,6 @@ namespace {
 using Ordered = nlohmann::ordered_json;
 using To = CirRetention::To;
 
-constexpr auto k_to_words = enum_table<To>({{"file", To::file}, {"database", To::database}});
-
 Ordered one_json(const CirRetention& retention, const MissionId& mission) {
   for (const auto& one : value_or_problem(retention.list()))
     if (one.mission == mission) return archived_json(one);
@@ -29,7 +27,7 @@ Response move(AdminApi& s, const Request& request) {
   const auto body = json_body(request, false);
   std::vector<FieldError> errors;
   Fields fields(body, "", errors);
-  const auto to = fields.word("to", k_to_words, true);
+  const auto to = fields.word("to", k_cirs_to_words, true);
   fields.finish();
   refuse_if_any(errors);
   const auto work = [&s, mission, to = to.value()](JobContext& context) -> Result<JobEnd> {
@@ -43,7 +41,7 @@ Response move(AdminApi& s, const Request& request) {
     return JobEnd{"/api/v1/cir-archive", std::to_string(moved.value().n_cirs)};
   };
   Job job = value_or_problem(s.jobs.submit("cir_archive", "{}", work));
-  s.audit(request, "cir.archive " + to_string(mission) + " to " + std::string(k_to_words.word(*to)));
+  s.audit(request, "cir.archive " + to_string(mission) + " to " + std::string(k_cirs_to_words.word(*to)));
   return job_outcome(s.jobs, request, std::move(job), [&s, mission](const Job&) {
     return json_response(200, one_json(s.cir_retention, mission));
   });

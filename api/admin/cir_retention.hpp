@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "api/kit/storage_status.hpp"
+#include "core/base/enum_table.hpp"
 #include "core/base/locked.hpp"
 #include "core/base/steady.hpp"
 #include "core/ports/cir_archive.hpp"
@@ -66,6 +67,8 @@ class CirRetention {
   Locked<Totals> totals_;
 };
 
+inline constexpr auto k_cirs_to_words = enum_table<CirRetention::To>(
+    {{"file", CirRetention::To::file}, {"database", CirRetention::To::database}});
 nlohmann::ordered_json archived_json(const ArchivedCirs& one);
 
 }  // namespace anchord::api

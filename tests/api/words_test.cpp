@@ -8,6 +8,7 @@
 #include <set>
 
 #include "api/admin/alarm_rules.hpp"
+#include "api/admin/cir_retention.hpp"
 #include "api/anchors/frame_json.hpp"
 #include "api/calibration/calibration_service.hpp"
 #include "api/calibration/datum_change.hpp"
@@ -263,9 +264,11 @@ TEST(WireWords, AreThoseOfOpenApi) {
       {"Calibration.frame", words(k_frame_words)},
       {"MissionCreate.track_point", words(k_point_words)},
       {"Mission.track_point", words(k_point_words)},
+      {"MissionCorrection.track_point", words(k_point_words)},
       {"Mission.state", words(k_mission_state_words)},
       {"FlightTime.against_forecast", words(flight::k_against_forecast_words)},
       {"AnchorGoal.source", words(k_goal_source_words)},
+      {"POST /api/v1/missions/{id}/cir-archive.to", words(api::k_cirs_to_words)},
       {"MissionAction.action", words({"finish", "take_devices"}, flight::k_flight_action_words)},
       {"MissionAction.mode", words(flight::k_flight_mode_words)},
       {"Procedure.mode", words(flight::k_flight_mode_words)},
