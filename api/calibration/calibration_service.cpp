@@ -8,6 +8,7 @@
 #include "api/anchors/contradiction_watch.hpp"
 #include "api/calibration/calibration_place.hpp"
 #include "api/calibration/check_points_json.hpp"
+#include "api/calibration/flight_loading.hpp"
 #include "api/calibration/kit_profiles.hpp"
 #include "api/formats/evidence.hpp"
 #include "api/wire/budget_json.hpp"
@@ -23,52 +24,6 @@
 namespace anchord::api {
 
 using Json = nlohmann::json;
-
-Result<FlightData> load_flight(MeasurementStore& store, const Mission& mission,
-                               const std::function<bool()>& canceled, Loaded loaded,
-                               const std::vector<Exclusion>& exclusions) {
-  FlightData flight;
-  flight.mission = mission;
-  flight.exclusions = exclusions;
-  MeasurementStore::Filter filter;
-  filter.mission = mission.id;
-  filter.limit = 10'000;
-  // A long flight is the largest thing in memory: it is not to be moved as it grows.
-  BOOST_OUTCOME_TRY(const auto n_fixes, store.count_fixes(mission.id));
-  BOOST_OUTCOME_TRY(const auto n_ranges, store.count_ranges(mission.id));
-  flight.fixes.reserve(n_fixes);
-  if (loaded == Loaded::rows)
-    flight.rows.reserve(n_ranges);
-  else
-    flight.ranges.reserve(n_ranges);
-  do {
-    if (canceled()) return make_error(Errc::canceled, "canceled");
-    BOOST_OUTCOME_TRY(auto page, store.fixes(filter));
-    for (auto& row : page.rows) {
-      if (excluded(exclusions, row))
-        ++flight.n_fixes_excluded;
-      else
-        flight.fixes.push_back(std::move(row));
-    }
-    filter.after = page.next;
-  } while (!filter.after.empty());
-  filter.with_cir = loaded == Loaded::ranges_with_cir;
-  if (filter.with_cir) filter.limit = 1000;  // 4 kB each
-  do {
-    if (canceled()) return make_error(Errc::canceled, "canceled");
-    BOOST_OUTCOME_TRY(auto page, store.ranges(filter));
-    for (auto& row : page.rows) {
-      if (excluded(exclusions, row))
-        ++flight.n_ranges_excluded[row.anchor];
-      else if (loaded == Loaded::rows)
-        flight.rows.push_back(flight_range(row));
-      else
-        flight.ranges.push_back(std::move(row));
-    }
-    filter.after = page.next;
-  } while (!filter.after.empty());
-  return flight;
-}
 
 /// Flights by the place they have in the request; those to learn from stand behind.
 struct CalibrationService::Solved {
@@ -405,22 +360,21 @@ Result<void> CalibrationService::solve_kits(const CalibrationRequest& request, c
 
 Result<void> CalibrationService::load(const CalibrationRequest& request, const ModelRegistry::Active& models,
                                       JobContext& job, Solved& solved) {
-  const Loaded loaded = models.predictor.empty() ? Loaded::rows
-                        : models.needs_cir       ? Loaded::ranges_with_cir
-                                                 : Loaded::ranges;
   std::vector<MissionId> all = request.missions;
   all.insert(all.end(), request.learn_from.begin(), request.learn_from.end());
   for (const auto& id : all) {
     BOOST_OUTCOME_TRY(auto mission, deps_.missions.mission(id));
     BOOST_OUTCOME_TRY(const auto exclusions, deps_.exclusions.exclusions(id));
-    BOOST_OUTCOME_TRY(auto flight,
-                      load_flight(
-                          deps_.measurements, mission, [&] { return job.canceled(); }, loaded, exclusions));
-    if (!request.use_anchor_anchor) {
-      const auto between = [](const auto& r) { return r.kind == RangeKind::anchor_anchor; };
-      std::erase_if(flight.ranges, between);
-      std::erase_if(flight.rows, between);
+    FlightLoading how{.canceled = [&] { return job.canceled(); },
+                      .exclusions = exclusions,
+                      .between_anchors = request.use_anchor_anchor,
+                      .with_cir = models.needs_cir};
+    if (!models.predictor.empty()) {
+      how.correct = [&, &report = solved.models.emplace_back()](FlightData& part) {
+        report += correct_flight(models, part, request.likelihood, request.noise);
+      };
     }
+    BOOST_OUTCOME_TRY(auto flight, load_flight(deps_.measurements, mission, how));
     solved.flights.push_back(std::move(flight));
     job.progress(0.3 * static_cast<double>(solved.flights.size()) / static_cast<double>(all.size()), "load",
                  solved.flights.back().mission.name);
@@ -440,26 +394,20 @@ FlightOptions CalibrationService::options_of(const CalibrationRequest& request, 
 }
 
 Result<void> CalibrationService::solve_by_models(const CalibrationRequest& request,
-                                                 const ModelRegistry::Active& models,
                                                  const FlightOptions& options, JobContext& job,
                                                  Solved& solved, Solved& raw) {
   CalibrationRequest wanted = request;
-  if (!models.predictor.empty()) {
-    raw.flights = solved.flights;
-    std::size_t n_corrected = 0, n_believed = 0;
-    for (auto& flight : solved.flights) {
-      solved.models.push_back(correct_flight(models, flight, request.likelihood, request.noise));
-      n_corrected += solved.models.back().n_corrected;
-      n_believed += solved.models.back().n_believed;
-    }
-    // A kit's profile tells the bias of raw ranges: of corrected ones it would take it off twice, and what
-    // these teach is no bias of the kit.
-    if (n_corrected > 0) wanted.use_profile = false;
-    const bool needed = request.compare_uncorrected || request.models.ask_worth;
-    if (n_corrected + n_believed == 0 || !needed) raw.flights.clear();
+  std::size_t n_corrected = 0, n_believed = 0;
+  for (const auto& report : solved.models) {
+    n_corrected += report.n_corrected;
+    n_believed += report.n_believed;
   }
-  for (auto* flights : {&solved.flights, &raw.flights})
-    for (auto& flight : *flights) flight.keep_rows();
+  // A kit's profile tells the bias of raw ranges: of corrected ones it would take it off twice, and what
+  // these teach is no bias of the kit.
+  if (n_corrected > 0) wanted.use_profile = false;
+  if (n_corrected + n_believed > 0 && (request.compare_uncorrected || request.models.ask_worth)) {
+    for (const auto& flight : solved.flights) raw.flights.push_back(as_received(flight));
+  }
   BOOST_OUTCOME_TRYV(solve_kits(wanted, options, solved));
   if (raw.flights.empty()) return boost::outcome_v2::success();
   job.progress(0.7, "solve", "without the models");
@@ -539,7 +487,7 @@ Result<CalibrationService::Solved> CalibrationService::solve(const CalibrationRe
       use_site_outline(request.site_outline, solved.flights, out.origin, solved.frame, deps_.sites, options);
   job.progress(0.3, "solve", std::to_string(solved.flights.size()) + " flights");
   Solved raw;
-  BOOST_OUTCOME_TRYV(solve_by_models(request, models, options, job, solved, raw));
+  BOOST_OUTCOME_TRYV(solve_by_models(request, options, job, solved, raw));
   if (job.canceled()) return make_error(Errc::canceled, "canceled");
   conclude(request, models, solved, raw);
   out.created = deps_.clock.now();

@@ -59,14 +59,6 @@ struct CalibrationRequest {
 /// Reads the body of POST /calibrations; what is wrong is appended to `errors`.
 CalibrationRequest read_calibration_request(const nlohmann::json& body, std::vector<FieldError>& errors);
 
-/// How much of each range is loaded: what a solve asks, what models ask too, with the impulse responses.
-enum class Loaded : std::uint8_t { rows, ranges, ranges_with_cir };
-
-/// All rows of a mission, less those of `exclusions` that apply, which are counted.
-Result<FlightData> load_flight(MeasurementStore& store, const Mission& mission,
-                               const std::function<bool()>& canceled, Loaded loaded,
-                               const std::vector<Exclusion>& exclusions = {});
-
 /// Batch solves as jobs of kind `calibration`. Thread-safe.
 class CalibrationService {
  public:
@@ -102,8 +94,8 @@ class CalibrationService {
   FlightOptions options_of(const CalibrationRequest& request, JobContext& job) const;
   /// `raw`: the same without the models, where it is compared or their worth is asked for; else it stays
   /// empty.
-  Result<void> solve_by_models(const CalibrationRequest& request, const ModelRegistry::Active& models,
-                               const FlightOptions& options, JobContext& job, Solved& solved, Solved& raw);
+  Result<void> solve_by_models(const CalibrationRequest& request, const FlightOptions& options,
+                               JobContext& job, Solved& solved, Solved& raw);
   void conclude(const CalibrationRequest& request, const ModelRegistry::Active& models, Solved& solved,
                 const Solved& raw) const;
 

@@ -59,6 +59,20 @@ Result<ModelRegistry::Active> models_for(const FlightModelsWish& wish, const Mod
   return load_models(registry.source(), chosen, wish.correction.value_or(active->correction), true);
 }
 
+FlightModelsReport& FlightModelsReport::operator+=(const FlightModelsReport& part) {
+  const double sum_m = mean_correction_m * static_cast<double>(n_corrected) +
+                       part.mean_correction_m * static_cast<double>(part.n_corrected);
+  n_ranges += part.n_ranges;
+  n_los += part.n_los;
+  n_nlos += part.n_nlos;
+  n_corrected += part.n_corrected;
+  n_silent += part.n_silent;
+  n_believed += part.n_believed;
+  if (n_corrected > 0) mean_correction_m = sum_m / static_cast<double>(n_corrected);
+  if (note.empty()) note = part.note;
+  return *this;
+}
+
 FlightModelsReport correct_flight(const ModelRegistry::Active& models, FlightData& flight, bool likelihood,
                                   const StatedNoise& noise) {
   FlightModelsReport out;

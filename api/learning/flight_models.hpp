@@ -45,6 +45,8 @@ struct FlightModelsReport {
   std::optional<CorrectionWorth> worth{};  ///< absent: not asked
   bool used{true};                         ///< false: the flight was solved without them, for want of worth
   bool spoke() const { return n_corrected + n_believed > 0; }
+  /// With what they did to other ranges of the flight.
+  FlightModelsReport& operator+=(const FlightModelsReport& part);
 };
 /// Takes the models' corrections off the ranges of `flight` (a copy of the record, never the record), and
 /// tells the solver what the models believe of the error that is left.

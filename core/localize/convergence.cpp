@@ -56,14 +56,6 @@ FlightData first_part(const FlightData& flight, std::size_t n) {
   return part;
 }
 
-/// Without what a model made of the ranges.
-FlightData as_received(FlightData flight) {
-  for (std::size_t i = 0; i < flight.received_m.size(); ++i) flight.rows[i].distance_m = flight.received_m[i];
-  flight.received_m.clear();
-  flight.error_models.clear();
-  return flight;
-}
-
 FlightOptions raw_options(const FlightOptions& options) {
   FlightOptions raw = options;
   raw.fixed_bias_m = 0.0;
@@ -73,6 +65,13 @@ FlightOptions raw_options(const FlightOptions& options) {
 }
 
 }  // namespace
+
+FlightData as_received(FlightData flight) {
+  for (std::size_t i = 0; i < flight.received_m.size(); ++i) flight.rows[i].distance_m = flight.received_m[i];
+  flight.received_m.clear();
+  flight.error_models.clear();
+  return flight;
+}
 
 Result<Convergence> convergence_of(const FlightData& flight, const FlightOptions& options, int steps) {
   if (steps < 1 || steps > 50) return make_error(Errc::invalid_argument, "iterations must be 1 to 50");

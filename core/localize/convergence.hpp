@@ -38,4 +38,7 @@ using Convergence = std::map<NetworkId, std::vector<ConvergenceStep>>;
 /// threads  pure
 Result<Convergence> convergence_of(const FlightData& flight, const FlightOptions& options, int steps);
 
+/// A flight without what models made of its ranges. flight  its ranges are kept as rows
+FlightData as_received(FlightData flight);
+
 }  // namespace anchord
