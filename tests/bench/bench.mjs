@@ -6,7 +6,7 @@ import { existsSync, mkdtempSync, rmSync, writeFileSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { fileURLToPath } from 'node:url';
-import { eventually, run, startServer } from '../e2e/server.mjs';
+import { run, startServer } from '../e2e/server.mjs';
 import { commands } from './commands.mjs';
 import { dashboard } from './dashboard.mjs';
 import { databases } from './databases.mjs';

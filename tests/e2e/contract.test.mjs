@@ -8,6 +8,7 @@ import { join } from 'node:path';
 import { createInterface } from 'node:readline';
 import { after, before, test } from 'node:test';
 import { Contract, checked } from './contract.mjs';
+import { caster, rover } from './device_bodies.mjs';
 import { ndjson, simulatedFlight } from './flight.mjs';
 import { omlox, unknown } from './omlox.mjs';
 import { room_png } from './room.mjs';
@@ -376,16 +377,10 @@ async function radio_settings() {
 }
 
 test('devices: set up, refused, changed, asked, looked for', async () => {
-  const device = {
-    kind: 'gnss',
-    name: 'rover',
-    address: 'serial:/dev/serial/by-id/of-the-contract-test',
-    options: { format: 'nmea' },
-  };
-  const made = await call('POST', '/api/v1/devices', { expect: 201, json: device });
+  const made = await call('POST', '/api/v1/devices', { expect: 201, json: rover });
   ids.device = made.json.id;
-  await call('POST', '/api/v1/devices', { expect: 409, json: device });
-  await call('POST', '/api/v1/devices', { expect: 422, json: { ...device, address: 'teapot:1' } });
+  await call('POST', '/api/v1/devices', { expect: 409, json: rover });
+  await call('POST', '/api/v1/devices', { expect: 422, json: { ...rover, address: 'teapot:1' } });
   const path = `/api/v1/devices/${ids.device}`,
     patch = { json: { name: 'rover of the contract test' } };
   await call('PATCH', path, { expect: 428, ...patch });
@@ -393,10 +388,7 @@ test('devices: set up, refused, changed, asked, looked for', async () => {
   await call('PATCH', path, { expect: 412, ...patch, headers: { 'if-match': made.headers.get('etag') } });
   await call('POST', `${path}/actions`, { expect: 422, json: { action: 'identify' } }); // it is not plugged in
   await call('POST', '/api/v1/discovery', { expect: 200, json: {}, headers: { prefer: 'wait=30' } });
-  const spare = await call('POST', '/api/v1/devices', {
-    expect: 201,
-    json: { kind: 'ntrip', address: 'tcp://127.0.0.1:1', options: { mount: 'M' }, enabled: false },
-  });
+  const spare = await call('POST', '/api/v1/devices', { expect: 201, json: caster });
   await radio_settings();
   await call('DELETE', `/api/v1/devices/${spare.json.id}`, {
     expect: 204,
@@ -566,6 +558,9 @@ test('what can be deleted', async () => {
   assert.equal((await move('file')).n_moved, 1);
   assert.equal((await call('GET', '/api/v1/cir-archive', { expect: 200 })).json.items[0].mission, ids.spare);
   assert.equal((await move('database')).n_moved, 0);
+  const named = { json: { name: 'spare, named anew' } };
+  await call('PATCH', spare, { expect: 428, ...named });
+  await call('PATCH', spare, { expect: 200, ...named, headers: { 'if-match': await etag(spare) } });
   await call('DELETE', spare, { expect: 428 });
   await call('DELETE', spare, { expect: 412, headers: { 'if-match': '"m-0"' } });
   await call('DELETE', spare, { expect: 204, headers: { 'if-match': await etag(spare) } });
