@@ -8,7 +8,7 @@ import {
   round_length,
   sigma_h,
 } from '../src/map/enu';
-import { accuracy, age, bearing, clock, fixed, grouped, latlon, plain } from '../src/ui/format';
+import { accuracy, age, axis_m, bearing, clock, fixed, grouped, latlon, plain } from '../src/ui/format';
 import { why_not_done } from '../src/ui/words';
 
 describe('ENU', () => {
@@ -113,4 +113,11 @@ describe('what to do about a twin', () => {
     )!.text;
   it('is another height where the twin lies above', () => expect(twin(0.1, 7)).toMatch(/higher or lower/));
   it('is to leave the line where it lies beside', () => expect(twin(6, 0)).toMatch(/across/));
+});
+
+describe('a length on an axis', () => {
+  it('has the unit a person would use, and no word where the axis has no room for one', () => {
+    expect([100, 10, 1, 0.1, 0.01, 0.001].map(axis_m)).toEqual(['100 m', '10 m', '1 m', '10 cm', '1 cm', '1 mm']);
+    expect(axis_m(null)).toBe('');
+  });
 });

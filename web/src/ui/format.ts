@@ -62,6 +62,11 @@ export function accuracy(m: number | null | undefined): string {
   if (m < 0.01) return `±${Math.max(1, Math.round(m * 1000))} mm`;
   return m < 1 ? `±${Math.round(m * 100)} cm` : `±${m < 10 ? m.toFixed(1) : Math.round(m)} m`;
 }
+/// A length on an axis: 10 m, 10 cm, 1 mm. Null, as an axis has it where there is no room for one, is no word.
+export function axis_m(m: number | null): string {
+  if (m === null) return '';
+  return m >= 1 ? `${m} m` : m >= 0.01 ? `${Math.round(m * 100)} cm` : `${Math.round(m * 1000)} mm`;
+}
 export function bytes(v: number | null | undefined): string {
   if (v == null) return MISSING;
   const units = ['B', 'kB', 'MB', 'GB', 'TB'];

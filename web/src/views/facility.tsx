@@ -5,6 +5,7 @@ import { change_facility, facility, patch_of, type Facility, type Fields } from 
 import { draft_of } from '../state/drafts';
 import { may } from '../state/session';
 import { say, when_back } from '../state/store';
+import { Problem } from '../ui/problem';
 import { useDraft } from '../ui/use_draft';
 import { useStable } from '../ui/use_stable';
 
@@ -56,11 +57,7 @@ export function FacilityPanel({ anchor, changed }: { anchor: string; changed: ()
           </button>
         )}
       </div>
-      {problem && (
-        <div class="problem" role="status">
-          <b>That did not work.</b> {problem}
-        </div>
-      )}
+      <Problem text={problem} />
       {known && editing !== anchor && <Shown fields={known.fields} />}
       {known && editing === anchor && (
         <Form

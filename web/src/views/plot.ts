@@ -1,5 +1,6 @@
 import uPlot from 'uplot';
 import 'uplot/dist/uPlot.min.css';
+import { axis_m } from '../ui/format';
 
 interface Look {
   ink: string;
@@ -11,9 +12,6 @@ interface Look {
   width: number;
   rem: number;
 }
-
-const words = (m: number): string =>
-  m >= 1 ? `${m} m` : m >= 0.01 ? `${Math.round(m * 100)} cm` : `${Math.round(m * 1000)} mm`;
 
 const decades = (min: number, max: number): number[] => {
   const out: number[] = [];
@@ -60,7 +58,7 @@ export function make_convergence(box: HTMLElement, look: Look, limit_m: number |
           splits: (_u, _i, min, max) => decades(min, max),
           grid: { stroke: look.line, width: 1 },
           ticks: { show: false },
-          values: (_u, v) => v.map(words),
+          values: (_u, v) => v.map(axis_m),
         },
       ],
       series: [{}, { stroke: look.ink, width: look.width, points: { show: false }, spanGaps: false }],
@@ -86,8 +84,8 @@ export function make_convergence(box: HTMLElement, look: Look, limit_m: number |
             c.strokeStyle = look.ground;
             c.lineWidth = 4 * px;
             c.lineJoin = 'round';
-            c.strokeText(`limit ≤ ${words(limit_m)}`, u.bbox.left + u.bbox.width, y - 2 * px);
-            c.fillText(`limit ≤ ${words(limit_m)}`, u.bbox.left + u.bbox.width, y - 2 * px);
+            c.strokeText(`limit ≤ ${axis_m(limit_m)}`, u.bbox.left + u.bbox.width, y - 2 * px);
+            c.fillText(`limit ≤ ${axis_m(limit_m)}`, u.bbox.left + u.bbox.width, y - 2 * px);
             c.restore();
           },
         ],

@@ -21,6 +21,7 @@ import { keep_draft } from '../state/drafts';
 import { current_scene, revision, say } from '../state/store';
 import { accuracy, date, fixed } from '../ui/format';
 import { Icon, Mark, StatusChip, STATUS_LOOK } from '../ui/marks';
+import { Problem } from '../ui/problem';
 import { useDraft } from '../ui/use_draft';
 import { gate_line } from '../ui/gates';
 import { VERDICT_WORDS } from '../ui/words';
@@ -155,22 +156,19 @@ export function Publish({ mission }: { mission: MissionMsg }) {
         />
       )}
       {busy === 'calibrating' && solving && <p role="status">Solving {mission.n_ranges} ranges.</p>}
-      {problem && (
-        <div class="problem" role="status">
-          <b>That did not work.</b> {problem}
-          {!draft && (
-            <button
-              class="btn small"
-              onClick={() => {
-                keys.current.calibrate = idempotency_key();
-                solve(false);
-              }}
-            >
-              Try again
-            </button>
-          )}
-        </div>
-      )}
+      <Problem text={problem}>
+        {!draft && (
+          <button
+            class="btn small"
+            onClick={() => {
+              keys.current.calibrate = idempotency_key();
+              solve(false);
+            }}
+          >
+            Try again
+          </button>
+        )}
+      </Problem>
       {draft && (
         <>
           <div class="scroll" tabIndex={0} aria-label="Result of the calibration">

@@ -16,6 +16,7 @@ import { say, when_back } from '../../state/store';
 import { NotLoaded } from '../../ui/empty';
 import { grouped } from '../../ui/format';
 import { Icon } from '../../ui/marks';
+import { Problem } from '../../ui/problem';
 import { useStable } from '../../ui/use_stable';
 
 export function ExcludePanel({
@@ -92,11 +93,7 @@ export function ExcludePanel({
           <Icon name="close" />
         </button>
       </div>
-      {problem && (
-        <div class="problem" role="status">
-          <b>That did not work.</b> {problem}
-        </div>
-      )}
+      <Problem text={problem} />
       {able && (
         <div class="filters">
           <label>

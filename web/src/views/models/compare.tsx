@@ -4,6 +4,7 @@ import { error_text, is_unknown } from '../../api/client';
 import { is_bias, run_numbers, run_page, type Run, type RunNumbers, type Task } from '../../api/learning';
 import { fixed } from '../../ui/format';
 import { Icon } from '../../ui/marks';
+import { Problem } from '../../ui/problem';
 import { Unknown } from '../../ui/unknown';
 import { Axes, Drawing, line, scale, ticks, room } from '../chart';
 import { run_names } from './words';
@@ -140,11 +141,7 @@ export function Compare({ task, runs, close }: { task: Task; runs: readonly stri
           the others are compared.
         </Unknown>
       ))}
-      {problem && (
-        <div class="problem" role="status">
-          <b>That did not work.</b> {problem}
-        </div>
-      )}
+      <Problem text={problem} />
       {!sides && !problem && <p role="status">Loading the numbers.</p>}
       {sides && <Sides sides={sides} bias={is_bias(task)} />}
     </section>

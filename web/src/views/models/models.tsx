@@ -9,6 +9,7 @@ import { CopyBox } from '../../ui/copy_box';
 import { fixed } from '../../ui/format';
 import { NotLoaded } from '../../ui/empty';
 import { Chip } from '../../ui/marks';
+import { Problem } from '../../ui/problem';
 import { Unknown } from '../../ui/unknown';
 import { BiasPanel } from './bias';
 import { Compare } from './compare';
@@ -125,14 +126,12 @@ export function Models({ path }: { path: string | null }) {
           another run is shown.
         </Unknown>
       )}
-      {problem && (
-        <div class="problem" role="status">
-          <b>That did not work.</b> {problem}{' '}
-          <button class="btn small" onClick={reload}>
-            Try again
-          </button>
-        </div>
-      )}
+      <Problem text={problem}>
+        {' '}
+        <button class="btn small" onClick={reload}>
+          Try again
+        </button>
+      </Problem>
       {curl && chosen && (
         <div class="curl">
           <CopyBox

@@ -5,6 +5,7 @@ import { gate_of, promote, type Gate } from '../../api/learning';
 import { say } from '../../state/store';
 import { fixed } from '../../ui/format';
 import { Chip, Icon, Mark } from '../../ui/marks';
+import { Problem } from '../../ui/problem';
 import { useDialog } from '../../ui/use_dialog';
 
 export function Promote({
@@ -51,11 +52,7 @@ export function Promote({
       <p class="why">
         It classifies and corrects every range from the next one on. Flights that are already solved keep their models.
       </p>
-      {problem && (
-        <div class="problem" role="status">
-          <b>That did not work.</b> {problem}
-        </div>
-      )}
+      <Problem text={problem} />
       {gate && (
         <>
           <p>

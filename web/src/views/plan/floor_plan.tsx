@@ -24,6 +24,7 @@ import { say } from '../../state/store';
 import { Empty, useLoad } from '../../ui/empty';
 import { fixed } from '../../ui/format';
 import { Icon } from '../../ui/marks';
+import { Problem } from '../../ui/problem';
 import { useDialog } from '../../ui/use_dialog';
 
 type Corner = { readonly lon: number; readonly lat: number };
@@ -86,11 +87,7 @@ export function FloorPlanDialog({ corners, close, use_outline }: Props) {
           <Icon name="close" />
         </button>
       </div>
-      {problem && (
-        <div class="problem" role="status">
-          <b>That did not work.</b> {problem}
-        </div>
-      )}
+      <Problem text={problem} />
       {!held && (
         <>
           {all.map((f) => (

@@ -11,6 +11,7 @@ import { may } from '../../state/session';
 import { current_mission, current_scene, now_ms, tick, watched_lost } from '../../state/store';
 import { NotLoaded } from '../../ui/empty';
 import { age } from '../../ui/format';
+import { Problem } from '../../ui/problem';
 import { Exports } from '../pop_list';
 import { Unknown } from '../../ui/unknown';
 import { useLater } from '../../ui/use_later';
@@ -35,11 +36,7 @@ export function Plan({ id }: { id: string | null }) {
   return (
     <div class="plan" data-testid="plan">
       <Toolbar desk={desk} />
-      {problem && (
-        <div class="problem" role="status">
-          <b>That did not work.</b> {problem}
-        </div>
-      )}
+      <Problem text={problem} />
       {desk.unknown && (
         <Unknown what="plan" id={desk.unknown}>
           another plan is shown.

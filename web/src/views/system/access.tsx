@@ -15,6 +15,7 @@ import { say } from '../../state/store';
 import { Empty, useLoad } from '../../ui/empty';
 import { CopyBox } from '../../ui/copy_box';
 import { date, grouped } from '../../ui/format';
+import { Problem } from '../../ui/problem';
 
 const ROLE_WORDS: Record<string, string> = {
   viewer: 'sees everything',
@@ -70,11 +71,7 @@ export function AccessPanel() {
   return (
     <section class="sys-p" data-testid="access">
       <h2>Access</h2>
-      {problem && (
-        <div class="problem" role="status">
-          <b>That did not work.</b> {problem}
-        </div>
-      )}
+      <Problem text={problem} />
       <form
         class="callout addform"
         onSubmit={(e) => {

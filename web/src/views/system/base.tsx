@@ -10,6 +10,7 @@ import { accuracy, fixed, latlon, plain } from '../../ui/format';
 import { Empty, NotLoaded } from '../../ui/empty';
 import { CopyBox } from '../../ui/copy_box';
 import { Chip, Q } from '../../ui/marks';
+import { Problem } from '../../ui/problem';
 
 const SOURCES: readonly (readonly [BaseSource, string])[] = [
   ['', 'not known'],
@@ -302,11 +303,7 @@ function DatumForm({ site, done, close }: { site: Site | null; done: () => void;
           <input value={sigma} inputMode="decimal" placeholder="8" onInput={(e) => set_sigma(e.currentTarget.value)} />
         </label>
       </div>
-      {problem && (
-        <div class="problem" role="status">
-          <b>That did not work.</b> {problem}
-        </div>
-      )}
+      <Problem text={problem} />
       <div class="actions">
         {site && (
           <button type="button" class="btn" onClick={close}>

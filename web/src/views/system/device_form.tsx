@@ -3,6 +3,7 @@ import { useState } from 'preact/hooks';
 import { error_text } from '../../api/client';
 import { add_device, device_at, edit_device, type Device, type Found } from '../../api/devices';
 import { say } from '../../state/store';
+import { Problem } from '../../ui/problem';
 import { useDraft } from '../../ui/use_draft';
 import { Broker, Lines, Module, type Change } from './device_form_ranges';
 import {
@@ -120,11 +121,7 @@ export function DeviceForm({
           <Caster s={s} change={change} />
         )}
       </div>
-      {problem && (
-        <div class="problem" role="status">
-          <b>That did not work.</b> {problem}
-        </div>
-      )}
+      <Problem text={problem} />
       <div class="actions">
         {lack && <span class="mut">{lack}</span>}
         <button

@@ -9,6 +9,7 @@ import { NotLoaded } from '../../ui/empty';
 import { CopyBox } from '../../ui/copy_box';
 import { age, fixed } from '../../ui/format';
 import { Chip, Mark, Q } from '../../ui/marks';
+import { Problem } from '../../ui/problem';
 import { ConnectSteps } from './connect_steps';
 import { DeviceDetail } from './device_detail';
 import { DeviceForm } from './device_form';
@@ -82,11 +83,7 @@ export function DevicesPanel({ guided }: { guided: boolean }) {
           tune={operator ? set_radio : null}
         />
       )}
-      {(failed || problem) && (
-        <div class="problem" role="status">
-          <b>That did not work.</b> {failed || problem}
-        </div>
-      )}
+      <Problem text={failed || problem} />
       {found && (
         <FoundList
           found={found}

@@ -4,6 +4,7 @@ import { error_text } from '../../api/client';
 import { correct_flight, type Correction, type StoredFlight } from '../../api/missions';
 import { sites as fetch_sites, type Site } from '../../api/site';
 import { useLoad } from '../../ui/empty';
+import { Problem } from '../../ui/problem';
 import { point_words } from './levers';
 
 const AXES = ['Forward', 'Left', 'Up'] as const;
@@ -137,11 +138,7 @@ export function FlightForm({ flight, close }: { flight: StoredFlight; close: (ch
           </label>
         </div>
       )}
-      {problem && (
-        <div class="problem" role="status">
-          <b>That did not work.</b> {problem}
-        </div>
-      )}
+      <Problem text={problem} />
       <div class="actions">
         {correction === null && <span class="mut">Lever arms are numbers in metres.</span>}
         <button type="button" class="btn" onClick={() => close(false)}>

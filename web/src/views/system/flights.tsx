@@ -15,6 +15,7 @@ import { load_missions } from '../../state/archive';
 import { events, say, when_back } from '../../state/store';
 import { Empty } from '../../ui/empty';
 import { date, grouped } from '../../ui/format';
+import { Problem } from '../../ui/problem';
 import { useStable } from '../../ui/use_stable';
 import { FlightForm } from './flight_form';
 
@@ -71,11 +72,7 @@ export function FlightsPanel() {
           </a>
         )}
       </div>
-      {problem && (
-        <div class="problem" role="status">
-          <b>That did not work.</b> {problem}
-        </div>
-      )}
+      <Problem text={problem} />
       <div class="scrollx">
         <table class="tbl">
           <caption class="sr">The newest stored flights</caption>

@@ -4,6 +4,7 @@ import { error_text } from '../../api/client';
 import { compare_radio, read_radio, set_radio, type Device, type Radio } from '../../api/devices';
 import { mission_list } from '../../state/store';
 import { Mark } from '../../ui/marks';
+import { Problem } from '../../ui/problem';
 import { radio_differences } from './radio_words';
 import { useStable } from '../../ui/use_stable';
 
@@ -81,11 +82,7 @@ export function RadioPanel({
     >
       <b>Radio of {device.name || device.network_id}.</b>{' '}
       <span class="mut">Tag and anchors receive each other only with the same channel, rate, PRF and preamble.</span>
-      {problem && (
-        <div class="problem" role="status">
-          <b>That did not work.</b> {problem}
-        </div>
-      )}
+      <Problem text={problem} />
       {busy === 'read' && <p role="status">Reading from the tag.</p>}
       {radio && (
         <div class="addform">
