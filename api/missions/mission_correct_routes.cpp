@@ -26,17 +26,15 @@ struct Corrected {
 Corrected corrected(const Mission& before, const Json& body, std::vector<FieldError>& errors) {
   const Json now = mission_json(before, {}, {});
   Json declared{{"frame", now["frame"]}};
-  for (const char* key : k_corrected)
-    if (!now[key].is_null()) declared[key] = now[key];
-  Json whole = declared;
+  for (const char* key : k_corrected) declared[key] = now[key];
   if (!body.is_object()) {
     errors.push_back({"", "wrong_type", "must be an object"});
     return {before, ""};
   }
-  whole.merge_patch(body);
-  if (body.contains("frame") && whole["frame"] != declared["frame"])
+  if (body.contains("frame") && body["frame"] != now["frame"])
     errors.push_back({"/frame", "fixed", "cannot be changed: the measurements are stored in it"});
-  Corrected out{read_mission(whole, errors), ""};
+  declared.merge_patch(body);
+  Corrected out{read_mission(declared, errors), ""};
   out.mission.id = before.id;
   out.mission.state = before.state;
   out.mission.created = before.created;

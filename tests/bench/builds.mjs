@@ -52,18 +52,10 @@ async function streams(server, name, clients) {
   return { [`${name}, % of a core`]: share * 100, [`${name}, p50 ms`]: p50 };
 }
 
-const best = { old: {}, now: {} };
+const best = { old: {}, now: {} },
+  turns = Object.entries({ old, now });
 for (let round = 0; round < Number(asked); round++)
-  for (const [which, program] of round % 2
-    ? [
-        ['now', now],
-        ['old', old],
-      ]
-    : [
-        ['old', old],
-        ['now', now],
-      ]) {
-    // prettier-ignore
+  for (const [which, program] of round % 2 ? turns.toReversed() : turns) {
     const server = await startServer({ program: resolve(program), args: unlimited });
     try {
       const figures = {
