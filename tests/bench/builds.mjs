@@ -16,18 +16,16 @@ const k_rows = 10_000,
   k_bodies = 6,
   k_starts = 5;
 
-/** CPU ms from exec to ready of a server that has data, and ms of the clock. */
+/** Ms from exec to ready of a server that has data; its CPU time is less than a few ticks of the system's counter. */
 async function startup(server) {
-  let cpu_ms = Infinity,
-    ms = Infinity;
+  let ms = Infinity;
   for (let i = 0; i < k_starts; i++) {
     await server.stop();
     const begun = performance.now();
     await server.start();
     ms = Math.min(ms, performance.now() - begun);
-    cpu_ms = Math.min(cpu_ms, cpuSeconds(server.pid) * 1000);
   }
-  return { 'start-up, CPU ms': cpu_ms, 'start-up, ms': ms };
+  return { 'start-up, ms': ms };
 }
 
 async function ingest(server) {
