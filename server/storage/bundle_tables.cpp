@@ -12,7 +12,7 @@ namespace {
 /// Columns are "KIND NAME", one after the other: i integer, r real, t text, b bytes, u id; k is the key of a
 /// row of the table NAME, which leaves as its id; c is a real of the impulse response beside a range, and cb
 /// its bytes; lr is a real that came later (BundleColumn::later). "mission" among the columns is the flight
-/// itself. Keys ending in ? may be NULL.
+/// itself. Keys ending in ? may be NULL; a name ending in + came later (BundleTable::later).
 struct Line {
   BundlePart part;
   const char* name;
@@ -64,6 +64,8 @@ constexpr std::array k_lines{
          "ordinal", k_of_flight, "t.ordinal"},
     Line{BundlePart::own, "mission_procedure", "mission t state_json i changed_t_ns", "", k_of_flight,
          "t.mission_key"},
+    Line{BundlePart::own, "procedure_log+", "mission i number i t_ns t topic t message_json", "number",
+         k_of_flight, "t.number"},
     Line{BundlePart::measured, "uwb_range",
          "mission i kind i t_ns i received_t_ns i tag i antenna i anchor i seq r distance_m r rss_dbm "
          "r fp_dbm r rx_dbm r std_noise r heading_deg r truth_distance_m i truth_los c dt_ps "
@@ -226,6 +228,7 @@ BundleSpec spec_of(const Line& line) {
   BundleSpec spec;
   spec.part = line.part;
   spec.table.name = line.name;
+  if (spec.table.later = spec.table.name.ends_with('+'); spec.table.later) spec.table.name.pop_back();
   read_columns(line, spec);
   read_keys(line, spec);
   std::string head = "SELECT ";

@@ -59,7 +59,7 @@ export function flight_picture(): FlightPicture | null {
     const [e, n] = enu_from_geodetic({ lon: c.lon, lat: c.lat, h_m: origin.h_m }, origin);
     return [e, n];
   };
-  const decision = grid && (made.get(grid) ?? remember(grid, at));
+  const decision = grid && decision_picture(grid, at);
   return {
     outline: plan?.outline.map(at) ?? [],
     fence: plan?.fence.map(at) ?? [],
@@ -98,7 +98,9 @@ function lowest(scene: Scene | null): number | null {
   const ups = scene?.trail.map((q) => q.u) ?? [];
   return ups.length ? ups.reduce((a, b) => Math.min(a, b)) : null;
 }
-function remember(grid: GridMsg, at: (c: { lon: number; lat: number }) => Point): FlightPicture {
+export function decision_picture(grid: GridMsg, at: (c: { lon: number; lat: number }) => Point): FlightPicture {
+  const known_picture = made.get(grid);
+  if (known_picture) return known_picture;
   const rank = ranks(grid.candidates),
     known = grid.candidates.find((c) => c.plan_m !== null);
   // The planner's own metres are about the plan's origin; one candidate known both ways tells how far apart the two are.
