@@ -4,9 +4,10 @@
 #include <nlohmann/json.hpp>
 
 #include "api/flight/flight_state.hpp"
+#include "api/flight/plan_change_json.hpp"
 #include "api/flight/procedure_json.hpp"
-#include "api/stream/hub.hpp"
 #include "api/kit/late_writer.hpp"
+#include "api/stream/hub.hpp"
 #include "core/base/to_wire.hpp"
 #include "core/ports/procedure_log.hpp"
 
@@ -113,6 +114,7 @@ FlightService::State::Due FlightService::State::due(Work& w, const flight::Now& 
     w.last.shown_s = at.s;
   }
   out.logged = moved || soon;
+  if (out.logged && std::exchange(w.last.logged_changes, f.changes.n) != f.changes.n) out.plan = flown_by(f);
   if (moved || (growing_in(engine.state().step) && at.s - w.last.profiles_s >= k_profiles_s)) {
     out.profiles = true;
     w.last.profiles_s = at.s;
@@ -122,21 +124,24 @@ FlightService::State::Due FlightService::State::due(Work& w, const flight::Now& 
   return out;
 }
 
-void FlightService::State::log(const MissionId& mission, std::int64_t t_us, Topic topic,
+void FlightService::State::log(const MissionId& mission, std::int64_t t_us, std::string_view topic,
                                std::vector<std::string> messages) const {
   std::vector<ProcedureEntry> entries;
   for (auto& text : messages)
-    entries.push_back({UtcTime::from_us(t_us), std::string(info(topic).name), std::move(text)});
+    entries.push_back({UtcTime::from_us(t_us), std::string(topic), std::move(text)});
   if (entries.empty()) return;
   deps.late.write([&to = deps.procedure_log, mission,
                    entries = std::move(entries)] { return to.append(mission, entries); },
                   std::chrono::milliseconds{0});
 }
 
-void FlightService::State::publish(const ProcedureView& view, bool logged) const {
+void FlightService::State::publish(const Due& due) const {
+  if (!due.procedure) return;
+  const auto& view = *due.procedure;
   const auto text = to_wire(procedure_json(view));
   deps.hub.publish(Topic::procedure, text, view.t_us, to_string(view.mission), {}, view.mission);
-  if (logged) log(view.mission, view.t_us, Topic::procedure, {text});
+  if (due.plan) log(view.mission, view.t_us, k_log_plan, {to_wire(flown_plan_json(view.mission, *due.plan))});
+  if (due.logged) log(view.mission, view.t_us, info(Topic::procedure).name, {text});
 }
 
 void FlightService::State::show_grid(Guard& w) const {
@@ -146,7 +151,7 @@ void FlightService::State::show_grid(Guard& w) const {
   w.unlocked([&] {
     const auto text = to_wire(grid_json(grid));
     deps.hub.publish(Topic::mission_grid, text, grid.t_us, to_string(grid.mission), {}, grid.mission);
-    if (logged) log(grid.mission, grid.t_us, Topic::mission_grid, {text});
+    if (logged) log(grid.mission, grid.t_us, info(Topic::mission_grid).name, {text});
   });
 }
 
@@ -176,7 +181,7 @@ void FlightService::State::show_profiles(Guard& w) const {
   w.unlocked([&] {
     profiles.turns(to(Topic::mission_turn));
     profiles.heights(to(Topic::mission_height));
-    if (grown) log(profiles.mission, profiles.t_us, *grown, std::move(to_log));
+    if (grown) log(profiles.mission, profiles.t_us, info(*grown).name, std::move(to_log));
   });
 }
 

@@ -41,7 +41,8 @@ struct FlightService::State {
     std::uint64_t flight{0}, kept{~0ULL}, shown{~0ULL};
     double shown_s{-10}, profiles_s{-10};
     double logged_decision_s{-10}, logged_profiles_s{-10};
-    std::optional<Topic> growing{};  ///< of the profiles that grew when they were last shown
+    std::uint64_t logged_changes{~0ULL};  ///< of the plan
+    std::optional<Topic> growing{};       ///< of the profiles that grew when they were last shown
     bool flew{false};
   };
   /// What rounds, requests and measurements share. No disk, no estimate, no JSON, no message and nothing long
@@ -87,18 +88,21 @@ struct FlightService::State {
   template <class Part>
   Part outcome(const MissionId& mission, Part KeptOutcome::*part);
   void keep(const MissionId& mission, const ToKeep& what) const;
+  static FlownPlan flown_by(const flight::ActiveFlight& f);
   static ProcedureView procedure(const flight::Now& at, const flight::Operations& operations,
                                  const flight::ActiveFlight& f);
   /// What is to be shown after a round.
   struct Due {
     std::optional<ProcedureView> procedure{};
     bool logged{false};                 ///< the procedure, for a replay too
+    std::optional<FlownPlan> plan{};    ///< for a replay, as it began or was changed
     bool grid{false}, profiles{false};  ///< apart, once the procedure was
   };
   static Due due(Work& w, const flight::Now& at);
-  void publish(const ProcedureView& view, bool logged) const;
+  void publish(const Due& due) const;
   /// For a replay, whenever the disk has time for it.
-  void log(const MissionId& mission, std::int64_t t_us, Topic topic, std::vector<std::string> messages) const;
+  void log(const MissionId& mission, std::int64_t t_us, std::string_view topic,
+           std::vector<std::string> messages) const;
   void show_grid(Guard& w) const;
   static std::optional<Topic> take_grown(Last& last, procedure::Step step, double now_s);
   void show_profiles(Guard& w) const;

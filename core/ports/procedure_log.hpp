@@ -11,7 +11,11 @@
 
 namespace anchord {
 
-/// One message of a flight as it was shown: of topic procedure, mission.grid, mission.turn or mission.height.
+/// Topic of the plan as it is flown, from its start or a change on.
+inline constexpr const char* k_log_plan = "plan";
+
+/// One message of a flight as it was shown: of topic procedure, mission.grid, mission.turn or mission.height,
+/// or k_log_plan.
 struct ProcedureEntry {
   UtcTime time{};
   std::string topic;

@@ -33,6 +33,7 @@
 #include "core/ml/recipe.hpp"
 #include "core/planning/local_plan.hpp"
 #include "core/planning/plan_change.hpp"
+#include "core/ports/procedure_log.hpp"
 #include "core/procedure/machine.hpp"
 #include "core/procedure/safety.hpp"
 #include "core/types/event_level.hpp"
@@ -191,7 +192,7 @@ Json topic_names() {
 
 /// What the procedure shows.
 Json procedure_topic_names() {
-  Json out = Json::array();
+  Json out{k_log_plan};
   for (const auto topic : {Topic::procedure, Topic::mission_grid, Topic::mission_turn, Topic::mission_height})
     out.push_back(info(topic).name);
   return out;

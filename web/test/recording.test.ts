@@ -178,6 +178,7 @@ describe('what the procedure showed', () => {
     data: { mission: 'm', t_us: t_s * 1e6, ...data },
   });
   const log = [
+    entry(9, 'plan', { plan: { waypoints: [{ lon: 1, lat: 2 }], settings: { max_height_m: 12 } } }),
     entry(10, 'procedure', { status: 'running', step: 'turn', in_step_s: 2 }),
     entry(12, 'mission.turn', { anchor: '0x2', running: true, samples: [[10, -80]], bearing_deg: null }),
     entry(17, 'mission.turn', { anchor: '0x2', running: false, samples: [[10, -80], [20, -81]], bearing_deg: 10 }), // prettier-ignore
@@ -193,6 +194,7 @@ describe('what the procedure showed', () => {
     expect(player.scene.procedure).toBeNull();
     player.to(14e6, 1000);
     expect(player.scene.procedure?.value.step).toBe('turn');
+    expect(player.scene.flown).toMatchObject({ high_m: 12, plan: { waypoints: [{ lon: 1, lat: 2 }] } });
     expect(player.scene.turns.get('0x2')?.value).toMatchObject({ running: true, best: null });
     expect(player.scene.grid).toBeNull();
     player.to(40e6, 1000);

@@ -1,5 +1,6 @@
 /// A stored flight, and the player that feeds a scene from it as the stream would have. No DOM.
 import { get, list, type Wire } from '../api/contract';
+import { plan_of, setting, type Plan } from '../api/plans';
 import {
   all,
   count,
@@ -222,6 +223,16 @@ const adding = <T>(read: (v: unknown) => T | null, put: (scene: Scene, value: T,
   };
 };
 const SHOWN: Readonly<Record<string, (data: unknown) => Shown['add'] | null>> = {
+  plan: adding(
+    (data): Plan | null => {
+      const o = obj((data as { plan?: unknown } | null)?.plan);
+      return o && plan_of(o);
+    },
+    (scene, plan) => {
+      scene.flown = { plan, low_m: setting(plan, 'min_height_m'), high_m: setting(plan, 'max_height_m') };
+      scene.estimates_version++;
+    },
+  ),
   procedure: adding(procedure, (scene, p, at_ms) => scene.add_procedure(p, at_ms)),
   'mission.grid': adding(grid, (scene, g, at_ms) => scene.add_grid(g, at_ms)),
   'mission.turn': adding(turn, (scene, t, at_ms) => scene.turns.set(t.anchor, { value: t, at_ms })),
