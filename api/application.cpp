@@ -71,6 +71,8 @@ void Application::fly() { state_->flights.step(); }
 
 void Application::housekeeping_round() { state_->housekeeping.round(); }
 
+void Application::halt() { state_->flights.stop(); }
+
 void Application::stop() {
   if (state_->stopping.exchange(true)) return;
   state_->stop_told.notify_all();

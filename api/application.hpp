@@ -147,6 +147,8 @@ class Application {
   void fly();
   /// Removes what is due; only where Deps::housekeeping_by_hand is set.
   void housekeeping_round();
+  /// What flies holds, and nothing is commanded any more. Idempotent; stop() does it too.
+  void halt();
   /// Says bye to WebSocket clients, parks jobs, joins. Idempotent.
   void stop();
 

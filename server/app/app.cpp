@@ -1,5 +1,6 @@
 #include "server/app/app.hpp"
 
+#include <signal.h>
 #include <sys/resource.h>
 #include <unistd.h>
 
@@ -11,6 +12,7 @@
 #include "api/application.hpp"
 #include "api/mqtt/topic_name.hpp"
 #include "api/stream/hub.hpp"
+#include "core/base/locked.hpp"
 #include "core/base/text.hpp"
 #include "drivers/drone/signing_key.hpp"
 #include "drivers/link/address.hpp"
@@ -116,7 +118,14 @@ struct App::State {
   std::vector<Listener> listeners;
   std::shared_ptr<TlsKeeper> tls;  ///< null: no TLS
   bool stopped{false};
+  struct Commanding {
+    api::Application* application{nullptr};
+    bool taken_over{false};
+  };
+  Locked<Commanding> commanding;
 
+  Result<void> open_rows(const Waiting& waiting);
+  void abandon(std::string_view why);
   Result<void> first_token();
   Result<void> open_devices();
   Result<void> open_drone();
@@ -124,6 +133,7 @@ struct App::State {
   std::unique_ptr<Backups> make_backups() const;
   std::vector<api::AlarmCondition> alarms() const;
   void compose();
+  void open_door();
   Result<void> listen();
 };
 
@@ -142,22 +152,45 @@ api::StorageStatus status_of(Database& database) {
   return status;
 }
 
-Result<std::unique_ptr<Database>> open_rows(const Config& config) {
+}  // namespace
+
+Result<void> App::State::open_rows(const Waiting& waiting) {
   StorageOptions options;
-  options.data_dir = config.text("data_dir");
+  options.data_dir = data_dir;
   // One for each thread that reads, so that a command never waits for somebody else's to be free.
   options.readers = config.count("http.workers") + config.count("http.heavy_workers") +
                     config.count("http.upload_workers") + 10;
   BOOST_OUTCOME_TRY(options.synchronous,
                     k_synchronous_words.parse("storage.synchronous", config.text("storage.synchronous")));
   const auto& address = config.text("database");
-  BOOST_OUTCOME_TRY(auto database, open_store(address, options));
+  LeaseWish wish;
+  wish.server = worker_name();
+  wish.standby = config.flag("standby");
+  if (wish.standby && address.empty())
+    return make_error(Errc::invalid_argument,
+                      "standby: a folder has one server; give --database, which several can reach");
+  wish.stopping = waiting.stopping;
+  wish.waits = [&waiting](std::string_view other) {
+    log(LogLevel::info, "standing by", {{"server", other}});
+    if (waiting.ready) waiting.ready();
+  };
+  wish.lost = [this](std::string_view why) { abandon(why); };
+  BOOST_OUTCOME_TRY(database, open_store(address, options, std::move(wish)));
   if (!address.empty())
     log(LogLevel::info, "rows are in PostgreSQL", {{"database", sql::shown_address(address)}});
-  return database;
+  return boost::outcome_v2::success();
 }
 
-}  // namespace
+/// The other server may command the aircraft by now.
+void App::State::abandon(std::string_view why) {
+  log(LogLevel::error, "taken over from: ending", {{"why", why}});
+  {
+    auto c = commanding.lock();
+    c->taken_over = true;
+    if (c->application != nullptr) c->application->halt();
+  }
+  ::kill(::getpid(), SIGTERM);
+}
 
 Result<void> App::State::first_token() {
   if (config.text("auth") == "off" || access->has_tokens()) return boost::outcome_v2::success();
@@ -398,8 +431,15 @@ void App::State::compose() {
       static_cast<std::int64_t>(config.count("missions.keep_deleted_days")) * 86'400 * 1'000'000'000;
   application = std::make_unique<api::Application>(std::move(deps));
   application->start();
+  {
+    auto c = commanding.lock();
+    c->application = application.get();
+  }
   if (drone) drone->start();  // after a flight that goes on has said which aircraft is its own
   devices->start(application->device_rows());
+}
+
+void App::State::open_door() {
   AuthenticatorOptions options;
   options.hosts = host_policy(config, listeners);
   options.rate_per_s = static_cast<double>(config.count("rate.per_s"));
@@ -420,7 +460,8 @@ App::~App() { stop(); }
 const api::Router& App::router() const { return state_->application->router(); }
 const std::vector<std::string>& App::urls() const { return state_->urls; }
 
-Result<std::unique_ptr<App>> App::start(const Config& config, std::function<std::string()> doctor) {
+Result<std::unique_ptr<App>> App::start(const Config& config, std::function<std::string()> doctor,
+                                        const Waiting& waiting) {
   BOOST_OUTCOME_TRY(auto listeners, listeners_of(config));
   BOOST_OUTCOME_TRYV(check_listeners(config, listeners));
   auto state = std::make_unique<State>();
@@ -433,7 +474,7 @@ Result<std::unique_ptr<App>> App::start(const Config& config, std::function<std:
   s.doctor = std::move(doctor);
   s.data_dir = config.text("data_dir");
   BOOST_OUTCOME_TRY(s.proxies, TrustedProxies::parse(config.list("trusted_proxies")));
-  BOOST_OUTCOME_TRY(s.database, open_rows(config));
+  BOOST_OUTCOME_TRYV(s.open_rows(waiting));
   s.metrics = std::make_unique<Metrics>(ANCHORD_VERSION);
   api::AccessOptions access_options;
   access_options.auth_off = config.text("auth") == "off";
@@ -446,6 +487,7 @@ Result<std::unique_ptr<App>> App::start(const Config& config, std::function<std:
   BOOST_OUTCOME_TRYV(s.open_drone());
   BOOST_OUTCOME_TRYV(s.open_broker());
   s.compose();
+  s.open_door();
   auto app = std::unique_ptr<App>(new App(std::move(state)));
   BOOST_OUTCOME_TRYV(app->state_->listen());
   return app;
@@ -467,6 +509,8 @@ void App::reload() {
   log(LogLevel::info, "reloaded the certificate",
       {{"until", to_rfc3339(facts.not_after)}, {"sha256", facts.sha256}});
 }
+
+bool App::taken_over() const { return state_->commanding.copy().taken_over; }
 
 void App::stop() {
   auto& s = *state_;
@@ -496,6 +540,10 @@ void App::stop() {
   step("workers");
   s.http.reset();
   s.door.reset();
+  {
+    auto c = s.commanding.lock();
+    c->application = nullptr;
+  }
   s.application.reset();
   s.devices.reset();
   s.drone.reset();

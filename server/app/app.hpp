@@ -23,7 +23,13 @@ class App {
   /// in use), those of the database.
   /// `doctor`: what a look at folder, disk, database and clock finds, for a support bundle; empty: nobody
   /// looks.
-  static Result<std::unique_ptr<App>> start(const Config& config, std::function<std::string()> doctor = {});
+  /// `waiting`: how a server that stands by waits; canceled where it was told to stop.
+  struct Waiting {
+    std::function<bool()> stopping;
+    std::function<void()> ready;  ///< it stands by
+  };
+  static Result<std::unique_ptr<App>> start(const Config& config, std::function<std::string()> doctor = {},
+                                            const Waiting& waiting = {});
   ~App();
   App(const App&) = delete;
   App& operator=(const App&) = delete;
@@ -37,6 +43,8 @@ class App {
   /// Refuses new work, says goodbye to WebSockets, finishes what runs, flushes and closes the database. Logs
   /// how long each step took. Idempotent; within 10 s.
   void stop();
+  /// Another server has taken over: what flew was told to hold, and the process was asked to end (SIGTERM).
+  bool taken_over() const;
 
  private:
   struct State;

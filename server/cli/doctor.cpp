@@ -112,12 +112,14 @@ Finding postgres(const DoctorOptions& options) {
   const auto found = look_at_postgres(options.database);
   if (!found) return Finding{Level::failed, "database", found.error().message, "see docs/postgresql.md"};
   const auto& facts = found.value();
-  const std::string seen = shown + ", PostgreSQL " + facts.server_version + ", " +
-                           number(static_cast<double>(facts.bytes) / 1e6) + " MB, version " +
-                           std::to_string(facts.schema_version);
+  std::string seen = shown + ", PostgreSQL " + facts.server_version + ", " +
+                     number(static_cast<double>(facts.bytes) / 1e6) + " MB, version " +
+                     std::to_string(facts.schema_version);
   if (facts.schema_version > newest_schema_version())
     return Finding{Level::failed, "database", seen + " of a newer anchord",
                    "install the version that wrote it"};
+  if (!facts.server.empty()) seen += ", server " + facts.server;
+  if (!facts.standby.empty()) seen += ", standby " + facts.standby;
   return Finding{Level::ok, "database", seen};
 }
 

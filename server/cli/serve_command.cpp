@@ -28,7 +28,16 @@ int serve(const server::Config& config) {
   look.listen = config.list("listen");
   look.tls_certificate = config.text("tls.certificate");
   look.tls_key = config.text("tls.key");
-  auto app = server::App::start(config, [look] { return findings_json(examine(look)); });
+  const server::App::Waiting waiting{[] {
+                                       return signal_waits({SIGTERM, SIGINT});
+                                     },
+                                     [] { (void)server::notify_service_manager("READY=1"); }};
+  auto app = server::App::start(
+      config, [look] { return findings_json(examine(look)); }, waiting);
+  if (!app && app.error().code == Errc::canceled) {
+    server::log(server::LogLevel::info, "stopped");
+    return 0;
+  }
   if (!app) {
     std::fprintf(stderr, "anchord: %s\n", printable(app.error().message).c_str());
     return app.error().code == Errc::invalid_argument ? 2 : 1;
@@ -46,7 +55,7 @@ int serve(const server::Config& config) {
   (void)server::notify_service_manager("STOPPING=1");
   app.value()->stop();
   server::log(server::LogLevel::info, "stopped");
-  return 0;
+  return app.value()->taken_over() ? 1 : 0;
 }
 
 }  // namespace

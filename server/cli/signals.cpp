@@ -3,6 +3,8 @@
 #include <pthread.h>
 #include <signal.h>
 
+#include <algorithm>
+
 namespace anchord::cli {
 namespace {
 
@@ -27,6 +29,12 @@ int wait_for_signal(std::initializer_list<int> wanted) {
   int received = 0;
   sigwait(&signals, &received);
   return received;
+}
+
+bool signal_waits(std::initializer_list<int> wanted) {
+  sigset_t pending;
+  sigpending(&pending);
+  return std::ranges::any_of(wanted, [&](int one) { return sigismember(&pending, one) == 1; });
 }
 
 }  // namespace anchord::cli

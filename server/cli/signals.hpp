@@ -10,4 +10,7 @@ void block_signals(std::initializer_list<int> wanted);
 /// Number of the first of them that comes.
 int wait_for_signal(std::initializer_list<int> wanted);
 
+/// Whether one of them has come that nobody has received yet.
+bool signal_waits(std::initializer_list<int> wanted);
+
 }  // namespace anchord::cli

@@ -27,6 +27,8 @@ constexpr std::array k_options = {
            "PostgreSQL database, like postgresql://user@host/name, with its password in ~/.pgpass or the "
            "file of PGPASSFILE; empty: SQLite in data_dir",
            database},
+    Option{"standby", "false",
+           "with database: wait while another server has it, and take over when that one ends", flag},
     Option{"auth", "on",
            "off: no login, everyone may do everything; only on loopback addresses, for demonstrations",
            choice, "on|off"},

@@ -40,6 +40,7 @@ Failure classify(std::string_view state) {
   // Bytes that are no text, a number too large, a name too long for an index: the caller's data.
   if (group == "23" || in("P0001", "22021", "22P05", "22003", "22001", "54000")) return Failure::constraint;
   // Time-outs, locks, a standby that only reads (in two ways), a lack of rights, a disk that fails.
+  if (state == "AN001") return Failure::unavailable;  // assert_server: taken over from
   if (in("57014", "55P03", "25006", "25P03", "42501", "58030", "58000", "0A000")) return Failure::unavailable;
   if (state.empty() || group == "08" || group == "53" || group == "57" || group == "28" || group == "3D")
     return Failure::unavailable;

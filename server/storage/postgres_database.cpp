@@ -25,16 +25,21 @@ using sql::SqlError;
 constexpr auto k_look_every = std::chrono::seconds(2);
 constexpr const char* k_bytes = "SELECT pg_database_size(current_database())";
 constexpr const char* k_has_rows = "SELECT EXISTS (SELECT 1 FROM mission) OR EXISTS (SELECT 1 FROM token)";
+constexpr const char* k_who =
+    "SELECT CASE WHEN lease_t_ns > now_ns() THEN server ELSE '' END, "
+    "CASE WHEN standby_t_ns > now_ns() - 30000000000 THEN standby ELSE '' END FROM server_lease";
 constexpr const char* k_facts =
     "SELECT current_setting('server_version'), pg_database_size(current_database())";
 
 class PostgresDatabase final : public Database {
  public:
-  PostgresDatabase(const PostgresOptions& options, std::unique_ptr<sql::DataFolder> folder)
+  PostgresDatabase(const PostgresOptions& options, std::unique_ptr<sql::DataFolder> folder,
+                   std::unique_ptr<ServerLease> lease)
       : folder_(std::move(folder)),
+        lease_(std::move(lease)),
         gate_([address = options.address] { return std::make_unique<PostgresConnection>(address); },
               {options.writers, options.readers, options.max_queued_rows, options.max_queued_calls,
-               options.statement_timeout}),
+               options.statement_timeout, lease_ ? lease_->fence() : 0}),
         // The disk is the database server's: whether a mission still fits, it says when it does not.
         kept_(
             gate_, [] { return std::optional<Error>{}; }, sql::CirFolder(folder_->cir_archive())),
@@ -109,6 +114,7 @@ class PostgresDatabase final : public Database {
   }
 
   const std::unique_ptr<sql::DataFolder> folder_;
+  const std::unique_ptr<ServerLease> lease_;
   PostgresGate gate_;
   sql::SqlStores kept_;
   const std::unique_ptr<WorkStore> work_;
@@ -119,6 +125,12 @@ class PostgresDatabase final : public Database {
 
 bool has_rows(sql::Connection& connection) {
   sql::Query query(connection, k_has_rows);
+  return query.step() && query.integer() != 0;
+}
+
+/// Not yet in an empty database, nor in one of an older version.
+bool has_lease(sql::Connection& connection) {
+  sql::Query query(connection, "SELECT to_regclass('server_lease') IS NOT NULL");
   return query.step() && query.integer() != 0;
 }
 
@@ -134,6 +146,12 @@ Result<std::unique_ptr<Database>> open_postgres(const PostgresOptions& options) 
   BOOST_OUTCOME_TRYV(check_address(options.address));
   BOOST_OUTCOME_TRY(auto folder, sql::DataFolder::open(options.data_dir, 0));
   try {
+    std::unique_ptr<ServerLease> lease;
+    const bool leased = has_lease(*std::make_unique<PostgresConnection>(options.address));
+    // Before the migration: a newer server that stands by leaves the tables as they are until it is its turn.
+    if (options.lease && leased) {
+      BOOST_OUTCOME_TRY(lease, ServerLease::take(options.address, *options.lease));
+    }
     PostgresConnection connection(options.address);
     BOOST_OUTCOME_TRYV(sql::migrate_postgres(connection, postgresql_migrations(), SystemClock{}.now()));
     BOOST_OUTCOME_TRYV(sql::check_copy_is_whole(connection, sql::k_unfinished_in_postgres));
@@ -146,7 +164,11 @@ Result<std::unique_ptr<Database>> open_postgres(const PostgresOptions& options) 
               " is empty: copy the rows with 'anchord database copy', or give another --data-dir");
     }
     BOOST_OUTCOME_TRYV(folder->note_postgres(sql::shown_address(options.address)));
-    return std::unique_ptr<Database>(std::make_unique<PostgresDatabase>(options, std::move(folder)));
+    if (options.lease && !lease) {
+      BOOST_OUTCOME_TRY(lease, ServerLease::take(options.address, *options.lease));
+    }
+    return std::unique_ptr<Database>(
+        std::make_unique<PostgresDatabase>(options, std::move(folder), std::move(lease)));
   } catch (const SqlError& error) {
     return sql::to_error(error);
   }
@@ -164,6 +186,13 @@ Result<PostgresFacts> look_at_postgres(const std::string& address) {
       facts.bytes = query.as<std::uint64_t>();
     }
     facts.schema_version = sql::postgres_version(connection);
+    if (has_lease(connection)) {
+      sql::Query who(connection, k_who);
+      if (who.step()) {
+        facts.server = who.text();
+        facts.standby = who.text();
+      }
+    }
     connection.execute("ROLLBACK");
     return facts;
   } catch (const SqlError& error) {
@@ -171,7 +200,8 @@ Result<PostgresFacts> look_at_postgres(const std::string& address) {
   }
 }
 
-Result<std::unique_ptr<Database>> open_store(const std::string& address, const StorageOptions& options) {
+Result<std::unique_ptr<Database>> open_store(const std::string& address, const StorageOptions& options,
+                                             std::optional<LeaseWish> lease) {
   if (address.empty()) return open_database(options);
   PostgresOptions postgres;
   postgres.address = address;
@@ -179,6 +209,7 @@ Result<std::unique_ptr<Database>> open_store(const std::string& address, const S
   postgres.readers = options.readers;
   postgres.max_queued_rows = options.max_queued_rows;
   postgres.max_queued_calls = options.max_queued_calls;
+  postgres.lease = std::move(lease);
   return open_postgres(postgres);
 }
 

@@ -22,6 +22,11 @@ std::string begin_text(const char* mode, std::chrono::milliseconds statement_tim
          "'on', true) WHERE current_setting('synchronous_commit') = 'off'";
 }
 
+/// Refused where another server has taken over.
+std::string lease_text(std::int64_t fence) {
+  return fence == 0 ? "" : "; SELECT assert_server(" + std::to_string(fence) + ")";
+}
+
 /// Longer with every attempt, and never the same for two that met.
 void pause_before(int attempt) {
   const auto odd = static_cast<int>(SteadyClock::now().time_since_epoch().count() % 7);
@@ -120,7 +125,7 @@ std::unique_ptr<PostgresConnection> PostgresPool::opened() {
 
 PostgresGate::PostgresGate(PostgresPool::Open open, Limits limits)
     : limits_(limits),
-      begin_write_(begin_text("SERIALIZABLE", limits.statement_timeout)),
+      begin_write_(begin_text("SERIALIZABLE", limits.statement_timeout) + lease_text(limits.fence)),
       begin_read_(begin_text("REPEATABLE READ READ ONLY", limits.statement_timeout)),
       writers_(open, limits.writers, outage_),
       readers_(std::move(open), limits.readers, outage_) {}

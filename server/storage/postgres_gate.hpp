@@ -56,6 +56,7 @@ class PostgresGate final : public Gate {
   struct Limits {
     std::size_t writers, readers, max_rows, max_calls;
     std::chrono::milliseconds statement_timeout;
+    std::int64_t fence{0};  ///< of the lease of this server (server_lease.hpp); 0: it has none
   };
   struct Status {
     std::size_t queued_calls{}, queued_rows{};

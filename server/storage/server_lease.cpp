@@ -1,0 +1,197 @@
+#include "server/storage/server_lease.hpp"
+
+#include <thread>
+#include <utility>
+
+#include "server/storage/postgres_connection.hpp"
+
+namespace anchord {
+namespace {
+
+using sql::PostgresConnection;
+using sql::Query;
+using sql::SqlError;
+using SteadyClock = std::chrono::steady_clock;
+
+constexpr auto k_try_every = std::chrono::milliseconds(500);
+/// A standby that was not heard of for this long is none.
+constexpr std::int64_t k_heard_ns = 30'000'000'000;
+
+// Read committed: whoever writes meanwhile is neither waited for nor undone by it.
+constexpr const char* k_begin_lease =
+    "BEGIN ISOLATION LEVEL READ COMMITTED; SET LOCAL statement_timeout = 2000; SET LOCAL lock_timeout = 2000";
+constexpr const char* k_take_lease =
+    "INSERT INTO server_lease (one, server, fence, lease_t_ns, standby, standby_t_ns) VALUES (1, ?1, 1, "
+    "now_ns() + ?2, '', 0) ON CONFLICT (one) DO UPDATE SET server = excluded.server, fence = "
+    "server_lease.fence + 1, lease_t_ns = excluded.lease_t_ns, standby = '', standby_t_ns = 0 WHERE "
+    "server_lease.lease_t_ns < now_ns() RETURNING fence";
+constexpr const char* k_stand_by_lease =
+    "UPDATE server_lease SET standby = ?1, standby_t_ns = now_ns() WHERE one = 1 RETURNING server";
+constexpr const char* k_lease_holder = "SELECT server FROM server_lease";
+constexpr const char* k_renew_lease =
+    "UPDATE server_lease SET lease_t_ns = now_ns() + ?2 WHERE one = 1 AND fence = ?1 RETURNING "
+    "standby_t_ns > now_ns() - ?3";
+constexpr const char* k_give_back_lease =
+    "UPDATE server_lease SET lease_t_ns = 0 WHERE one = 1 AND fence = ?1";
+
+std::int64_t ns(std::chrono::milliseconds length) {
+  return std::chrono::duration_cast<std::chrono::nanoseconds>(length).count();
+}
+
+}  // namespace
+
+/// A connection that is opened again after it failed.
+class ServerLease::Line {
+ public:
+  explicit Line(std::string address) : address_(std::move(address)) {}
+  /// A transaction. Throws SqlError.
+  template <class Act>
+  auto run(Act act) {
+    if (!connection_) connection_ = std::make_unique<PostgresConnection>(address_);
+    auto connection = std::move(connection_);
+    connection->execute(k_begin_lease);
+    auto out = act(*connection);
+    connection->commit();
+    connection_ = std::move(connection);
+    return out;
+  }
+
+ private:
+  const std::string address_;
+  std::unique_ptr<PostgresConnection> connection_;
+};
+
+namespace {
+
+struct Attempt {
+  std::optional<std::int64_t> fence;
+  std::string holder;
+};
+
+Attempt attempt(PostgresConnection& c, const LeaseWish& wish) {
+  Attempt out;
+  {
+    Query take(c, k_take_lease);
+    take << wish.server << ns(wish.lease);
+    out.fence = take.returned();
+  }
+  if (out.fence) return out;
+  Query holder(c, wish.standby ? k_stand_by_lease : k_lease_holder);
+  if (wish.standby) holder << wish.server;
+  if (holder.step()) out.holder = holder.text();
+  return out;
+}
+
+Error held_by(const std::string& other) {
+  return make_error(
+      Errc::conflict,
+      "server " + other +
+          " has this database: stop it, or start this one with --standby, which waits and takes "
+          "over when the other one ends");
+}
+
+}  // namespace
+
+Result<std::unique_ptr<ServerLease>> ServerLease::take(const std::string& address, LeaseWish wish) {
+  // One that was killed has its lease to the end; then a new start need not fail.
+  const auto patience = SteadyClock::now() + wish.lease + 2 * k_try_every;
+  auto line = std::make_unique<Line>(address);
+  std::string named;
+  for (;;) {
+    try {
+      const auto made = line->run([&](PostgresConnection& c) { return attempt(c, wish); });
+      if (made.fence)
+        return std::unique_ptr<ServerLease>(new ServerLease(std::move(line), std::move(wish), *made.fence));
+      if (!wish.standby && SteadyClock::now() > patience) return held_by(made.holder);
+      if (wish.standby && wish.waits && named != made.holder) wish.waits(named = made.holder);
+    } catch (const SqlError& error) {
+      if (!wish.standby || named.empty()) return sql::to_error(error);  // else it comes back
+    }
+    if (wish.stopping && wish.stopping()) return make_error(Errc::canceled, "stopped while it stood by");
+    std::this_thread::sleep_for(k_try_every);
+  }
+}
+
+ServerLease::ServerLease(std::unique_ptr<Line> line, LeaseWish wish, std::int64_t fence)
+    : line_(std::move(line)),
+      wish_(std::move(wish)),
+      fence_(fence),
+      held_(std::in_place, Held{SteadyClock::now()}),
+      keeper_("anchord-lease", [this] { keep(); }),
+      watch_("anchord-leasewatch", [this] { watch(); }) {}
+
+ServerLease::~ServerLease() {
+  {
+    auto held = held_.lock();
+    held->stopping = true;
+  }
+  wake_.notify_all();
+  keeper_.join();
+  watch_.join();
+  (void)guarded("server lease", [this] { give_back(); });
+}
+
+void ServerLease::keep() {
+  for (;;) {
+    {
+      auto held = held_.lock();
+      const auto ended = [](const Held& h) { return h.stopping || h.over; };
+      if (held.wait_for(wake_, wish_.lease / 4, ended)) return;
+    }
+    (void)guarded("server lease", [this] { renew(); });
+  }
+}
+
+void ServerLease::watch() {
+  for (;;) {
+    {
+      auto held = held_.lock();
+      const auto ended = [](const Held& h) { return h.stopping || h.over; };
+      if (held.wait_for(wake_, wish_.lease / 20, ended)) return;
+      if (!held->stood_by || SteadyClock::now() - held->renewed < wish_.lease * 4 / 5) continue;
+    }
+    end("the database has been out of reach, and another server stands by, which takes over");
+  }
+}
+
+void ServerLease::renew() {
+  const auto asked = SteadyClock::now();
+  std::optional<std::int64_t> stood_by;
+  try {
+    stood_by = line_->run([&](PostgresConnection& c) {
+      Query query(c, k_renew_lease);
+      query << fence_ << ns(wish_.lease) << k_heard_ns;
+      return query.returned();
+    });
+  } catch (const SqlError&) {
+    return;  // away: watch() counts the time
+  }
+  if (!stood_by) return end("another server has taken over the database");
+  auto held = held_.lock();
+  held->renewed = asked;
+  held->stood_by = *stood_by != 0;
+}
+
+void ServerLease::end(const std::string& why) {
+  {
+    auto held = held_.lock();
+    if (std::exchange(held->over, true)) return;
+  }
+  wake_.notify_all();
+  if (wish_.lost) (void)guarded("server lease", [&] { wish_.lost(why); });
+}
+
+void ServerLease::give_back() {
+  try {
+    line_->run([&](PostgresConnection& c) {
+      Query query(c, k_give_back_lease);
+      query << fence_;
+      query.run();
+      return true;
+    });
+  } catch (const SqlError&) {
+    // It ends by itself.
+  }
+}
+
+}  // namespace anchord

@@ -1,0 +1,69 @@
+#pragma once
+
+#include <chrono>
+#include <condition_variable>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+#include <string_view>
+
+#include "core/base/guard.hpp"
+#include "core/base/locked.hpp"
+#include "core/base/result.hpp"
+
+namespace anchord {
+
+/// How a server wants to have a PostgreSQL database.
+struct LeaseWish {
+  std::string server;   ///< its name, for people
+  bool standby{false};  ///< wait for as long as another one has it
+  std::chrono::milliseconds lease{5'000};
+  std::function<bool()> stopping;                     ///< asked while it waits
+  std::function<void(std::string_view other)> waits;  ///< once: who has it
+  std::function<void(std::string_view why)> lost;     ///< once, from another thread: it must end now
+};
+
+/// The right of one server to a PostgreSQL database: a row with a fencing number, renewed by the database's
+/// clock. A write that names a number which is no longer that of the row is refused by the database
+/// (assert_server), so that a server that stood still and was taken over from stores nothing more. While the
+/// database is away the holder goes on; where another server was seen to stand by, only for as long as the
+/// lease holds, since that one may have taken over meanwhile.
+class ServerLease {
+ public:
+  /// Returns with the lease. errors  conflict: another server has it, and this one does not stand by;
+  /// canceled: stopping() while it waited; storage_unavailable
+  static Result<std::unique_ptr<ServerLease>> take(const std::string& address, LeaseWish wish);
+  /// Gives it back, so that the one that stands by need not wait.
+  ~ServerLease();
+  ServerLease(const ServerLease&) = delete;
+  ServerLease& operator=(const ServerLease&) = delete;
+
+  std::int64_t fence() const { return fence_; }
+
+ private:
+  class Line;
+  ServerLease(std::unique_ptr<Line> line, LeaseWish wish, std::int64_t fence);
+  struct Held {
+    std::chrono::steady_clock::time_point renewed{};
+    bool stood_by{false};  ///< another server was seen to wait
+    bool over{false};
+    bool stopping{false};
+  };
+  /// Renews it; what is asked of a database that hangs takes seconds.
+  void keep();
+  /// Notices in time that it was not renewed.
+  void watch();
+  void renew();
+  void end(const std::string& why);
+  void give_back();
+
+  const std::unique_ptr<Line> line_;
+  const LeaseWish wish_;
+  const std::int64_t fence_;
+  Locked<Held> held_;
+  std::condition_variable wake_;
+  Thread keeper_, watch_;
+};
+
+}  // namespace anchord
