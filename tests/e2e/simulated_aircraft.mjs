@@ -9,15 +9,20 @@ import { binary, eventually, startServer } from './server.mjs';
 export async function serverWithAircraft() {
   const port = await free_udp_port();
   const server = await startServer({ auth: 'off', args: ['--drone-address', `udp://:${port}`] });
+  return { server, ...(await startAircraft(server.url, port)) };
+}
+
+/** One that speaks MAVLink to this UDP port. */
+export async function startAircraft(url, port) {
   let said = '';
   const aircraft = spawn(
     binary,
-    ['simulate', 'drone', '--mavlink', `udp://127.0.0.1:${port}`, '--url', server.url, '--ready', '2'],
+    ['simulate', 'drone', '--mavlink', `udp://127.0.0.1:${port}`, '--url', url, '--ready', '2'],
     { stdio: ['ignore', 'ignore', 'pipe'] },
   );
   aircraft.stderr.setEncoding('utf8').on('data', (chunk) => (said += chunk));
   const mission = await eventually('the aircraft makes its mission', () => /mission ([0-9a-f-]{36})/.exec(said)?.[1]);
-  return { server, aircraft, mission };
+  return { aircraft, mission };
 }
 
 /** Plans round the hall and starts, what may be confirmed confirmed; at work at a waypoint, nobody in control: the id of the plan. */

@@ -6,16 +6,18 @@ import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { after, before, test } from 'node:test';
 import { LiveClient } from './live.mjs';
-import { free_tcp_port } from './ports.mjs';
+import { free_tcp_port, free_udp_port } from './ports.mjs';
 import { startPostgres } from './postgres.mjs';
 import { eventually, root, run, Server } from './server.mjs';
+import { startAircraft, startFlight } from './simulated_aircraft.mjs';
 
 const folder = mkdtempSync(join(tmpdir(), 'anchord standby '));
-let postgres, proxy, front, holder, waiting;
+let postgres, proxy, front, udp, holder, waiting;
 
 /** One that stands by; `there` resolves when it has the database. */
 function standBy(port) {
-  const server = new Server({ args: ['--standby', '--database', postgres.url('anchord')], env: postgres.env });
+  const args = ['--standby', '--database', postgres.url('anchord'), '--drone-address', `udp://:${udp}`];
+  const server = new Server({ args, env: postgres.env });
   server.port = port;
   server.there = server.start(120_000);
   server.there.catch(() => {});
@@ -32,6 +34,7 @@ const rows_of = (mission) =>
 const passed_s = (since) => (performance.now() - since) / 1000;
 
 before(async () => {
+  udp = await free_udp_port();
   postgres = await startPostgres();
   await postgres.psql('CREATE DATABASE anchord');
   const ports = [await free_tcp_port(), await free_tcp_port()],
@@ -185,6 +188,29 @@ test('one that stood still and comes back stores nothing more, and ends', async 
   await found();
   assert.ok(await sent(mission, 1, 1), 'the other one takes the same row');
   await change_places(ended);
+});
+
+test('a flight in the air holds when its server is killed, and goes on when somebody resumes it on the other one', async () => {
+  // The aircraft's link is of this machine: whoever has the database hears it.
+  const { aircraft, mission } = await startAircraft(`http://${front}`, udp);
+  try {
+    await startFlight(holder, mission);
+    const ended = holder,
+      since = performance.now();
+    await ended.kill();
+    await waiting.there;
+    const procedure = async () => (await waiting.fetch(`/api/v1/missions/${mission}/procedure`)).json();
+    await eventually('it holds', async () => (await procedure()).status === 'hold', 20_000, 100);
+    console.log(`in hold on the other server after ${passed_s(since).toFixed(1)} s`);
+    const control = await waiting.fetch(`/api/v1/missions/${mission}/control`, { json: { action: 'take' } });
+    const { lease } = await control.json();
+    const resumed = await waiting.fetch(`/api/v1/missions/${mission}/actions`, { json: { action: 'resume', lease } });
+    assert.equal(resumed.status, 202, await resumed.text());
+    await eventually('it goes on', async () => (await procedure()).status === 'running', 20_000, 100);
+    await change_places(ended);
+  } finally {
+    aircraft.kill('SIGINT');
+  }
 });
 
 test('a database that cuts off all its sessions, as by a restart, ends neither of them', async () => {
