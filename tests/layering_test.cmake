@@ -7,7 +7,7 @@ cmake_minimum_required(VERSION 3.25)
 # The libraries, one row a folder, the deepest first; the project's own folders are below (rows):
 #   header other libraries its headers may include; source: those only its .cpp files may, beside the former
 # The standard library is always allowed; a library that no row names is refused, so that adding one is a decision.
-set(folders server/storage server/mqtt server api/formats api/wire api drivers core/flight core/floor_plan core/base core migrations)
+set(folders server/storage server/mqtt server api/formats api/wire api drivers core/flight core/floor_plan core/nlos core/base core migrations)
 
 # One row a subfolder, the lowest first: which project folders its files include, beside its own, and no others. A row
 # names only folders whose rows stand above it, so that no arrow goes back up and there is no circle; and only those that
@@ -84,6 +84,10 @@ set(core_source "^(ceres/|libsvm/|glog/|pthread\\.h$|opencv2/|GeographicLib/|pro
 # SHA-256 and base64, for everybody.
 set(core/base_header "^(${everywhere})")
 set(core/base_source "^(openssl/evp\\.h$|pthread\\.h$|sys/(random|stat)\\.h$|immintrin\\.h$)")
+
+# Powers of impulse responses: what the compiler has no operator for.
+set(core/nlos_header "^(${everywhere})")
+set(core/nlos_source "^immintrin\\.h$")
 
 # A live flight is deterministic: no library, and (rules below) no clock, thread or lock.
 set(core/flight_header "^(${everywhere})")

@@ -13,9 +13,10 @@
 namespace anchord::api {
 
 bool LineReader::fill() {
-  if (buffer_.empty()) buffer_.resize(64 * 1024);
+  constexpr std::size_t buffer_bytes = 64 * 1024;
+  if (!buffer_) buffer_ = std::make_unique_for_overwrite<char[]>(buffer_bytes);
   at_ = 0;
-  end_ = body_.read(buffer_);
+  end_ = body_.read({buffer_.get(), buffer_bytes});
   if (end_ > left_bytes_) throw BodyError(413, "the body is larger than the limit of this address");
   left_bytes_ -= end_;
   return end_ > 0;
@@ -27,7 +28,7 @@ bool LineReader::next(std::string& line) {
   bool any = false;
   while (at_ < end_ || fill()) {
     any = true;
-    const char* begin = buffer_.data() + at_;
+    const char* begin = buffer_.get() + at_;
     const void* found = std::memchr(begin, '\n', end_ - at_);
     const std::size_t n =
         found != nullptr ? static_cast<std::size_t>(static_cast<const char*>(found) - begin) : end_ - at_;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <string>
@@ -28,7 +29,7 @@ class LineReader {
   bool fill();
   BodyReader& body_;
   std::uint64_t left_bytes_;
-  std::vector<char> buffer_;
+  std::unique_ptr<char[]> buffer_;  ///< none yet: nothing was read
   std::size_t at_{0}, end_{0};
   bool too_long_{false};
 };

@@ -3,33 +3,51 @@
 #include <algorithm>
 #include <array>
 #include <cstddef>
+#include <limits>
+#include <memory>
 #include <span>
 
 namespace anchord {
 
-/// Value in the middle of the sorted values; of an even number the upper of the two. Reorders them.
+/// Value in the middle of the sorted values; of an even number the upper of the two. May reorder them.
 /// values  at least one, none NaN
 inline double upper_median(std::span<double> values) {
   std::size_t rank = values.size() / 2;
-  constexpr std::size_t many = 400, n_sample = 63, about = 8;
-  if (values.size() >= many) {
-    // Of so many a sample says between which two values the middle is, as a rule; they come to the front.
+  constexpr std::size_t many = 100, n_sample = 31, about = 6;
+  std::unique_ptr<double[]> room;
+  std::size_t used = 0;
+  while (values.size() >= many) {
+    // Of so many a sample says between which two values the one asked for is, as a rule; those are copied.
     std::array<double, n_sample> sample;
     for (std::size_t i = 0; i < n_sample; ++i) sample[i] = values[i * values.size() / n_sample];
     std::ranges::sort(sample);
-    const double least = sample[n_sample / 2 - about], most = sample[n_sample / 2 + about];
+    const std::size_t guess = rank * n_sample / values.size();
+    const double least = guess < about ? -std::numeric_limits<double>::infinity() : sample[guess - about];
+    const double most =
+        guess + about >= n_sample ? std::numeric_limits<double>::infinity() : sample[guess + about];
+    // Half of the values at most go on, half of those next: the room is never more than full.
+    if (!room) room = std::make_unique_for_overwrite<double[]>(values.size());
+    double* const to = room.get() + used;
     std::size_t below = 0, between = 0;
-    for (double& value : values) {
-      const double here = value;
-      value = values[between];
-      values[between] = here;
-      below += here < least ? 1 : 0;
-      between += here >= least && here <= most ? 1 : 0;
+    for (const double value : values) {
+      // No branch: which of them is taken cannot be foreseen.
+      to[between] = value;
+      below += static_cast<std::size_t>(value < least);
+      between += static_cast<std::size_t>(value >= least) & static_cast<std::size_t>(value <= most);
     }
-    if (below <= rank && rank < below + between) {
-      values = values.first(between);
-      rank -= below;
+    if (rank < below || rank >= below + between) break;
+    if (2 * between > values.size()) {
+      // Most of them are alike, and the one asked for is one of those.
+      const double usual = sample[guess];
+      const auto n_below = std::ranges::count_if(values, [&](double value) { return value < usual; });
+      const auto n_usual = std::ranges::count(values, usual);
+      const auto at = static_cast<std::ptrdiff_t>(rank);
+      if (n_below <= at && at < n_below + n_usual) return usual;
+      break;
     }
+    values = {to, between};
+    used += between;
+    rank -= below;
   }
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(rank);
   std::ranges::nth_element(values, middle);

@@ -12,6 +12,7 @@
 #include "core/localize/prior_conflict.hpp"
 #include "core/localize/residual.hpp"
 #include "core/localize/solver.hpp"
+#include "core/localize/warm_solve.hpp"
 #include "core/planning/gdop.hpp"
 
 namespace anchord {
@@ -75,12 +76,13 @@ std::vector<Mirror> mirrors_of(const FlightRows& flight, const JointFit& fit, st
   const double unit =
       static_cast<double>(block.n_in_track) / (static_cast<double>(rows.size()) * block.kappa);
   settings.bias_prior_sigma_m = options.delay_prior_m * std::sqrt(unit);
+  RangeBlock block_of_rows(rows);
   // Where a start came near to where one before it did, it would end there too.
   std::vector<Eigen::Vector3d> rough_m;
   const auto polish = [&](const Eigen::Vector3d& start) -> std::optional<AnchorMinimum> {
     settings.loss = Loss::cauchy;
     settings.loss_sigmas = 2.0;
-    const auto rough = descend_to_minimum(rows, start, settings);
+    const auto rough = descend_to_minimum(block_of_rows, start, settings);
     if (!rough) return std::nullopt;
     const auto known = [&](const Eigen::Vector3d& p) { return (rough.value().position_m - p).norm() < 1e-4; };
     if (std::ranges::any_of(rough_m, known)) return std::nullopt;
@@ -88,7 +90,7 @@ std::vector<Mirror> mirrors_of(const FlightRows& flight, const JointFit& fit, st
     settings.loss = options.loss;
     settings.loss_sigmas =
         default_bend(options.loss) * (options.loss == Loss::tukey ? options.mad_factor : 1.0);
-    const auto fine = descend_to_minimum(rows, rough.value().position_m, settings);
+    const auto fine = descend_to_minimum(block_of_rows, rough.value().position_m, settings);
     if (!fine) return std::nullopt;
     return fine.value();
   };

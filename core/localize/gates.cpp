@@ -7,6 +7,7 @@
 
 #include "core/localize/error_model_likelihood.hpp"
 #include "core/localize/geometry.hpp"
+#include "core/localize/joint_lines.hpp"
 #include "core/localize/residual.hpp"
 #include "core/localize/solver.hpp"
 
@@ -266,10 +267,11 @@ std::vector<RangeResidual> residuals_of(const FlightRows& flight, const JointFit
   const AnchorBlock& block = fit.normal.anchors[index];
   const JointState::Anchor& anchor = fit.state.anchors[index];
   std::vector<RangeResidual> all;
-  all.reserve(flight.anchors[index].rows.size());
-  for (const JointRow& row : flight.anchors[index].rows) {
-    const JointLine line = linearise(flight.track, row, fit.state.shared, anchor);
-    if (line.refused != TrackRefusal::none) continue;
+  const JointLines lines(flight.track, flight.anchors[index].rows, fit.state.shared, anchor);
+  all.reserve(lines.size());
+  for (std::size_t i = 0; i < lines.size(); ++i) {
+    const JointRow& row = *lines.rows()[i];
+    const JointLine line = lines.line(i);
     const double extra_m2 = std::max(line.position_variance_m2 - block.usual_position_variance_m2, 0.0);
     const double sigma2 = block.scale_m * block.scale_m + extra_m2;
     const double leverage = line.by_anchor.dot(block.own_inverse * line.by_anchor) / (block.kappa * sigma2);

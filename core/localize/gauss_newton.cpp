@@ -91,7 +91,11 @@ Descent descend(const RangeBlock& block, Unknowns& at, const SolverOptions& opti
 /// Descends from a place; no cost yet. The block is left with the scales of the round before the last.
 Result<AnchorMinimum> descend_from(RangeBlock& block, const WarmStart& start, const SolverOptions& options,
                                    double scale_tolerance_m) {
-  BOOST_OUTCOME_TRY(check_problem(block.observations(), start.position_m, options));
+  BOOST_OUTCOME_TRY(check_asked(block.observations().size(), start.position_m, options));
+  if (!block.checked()) {
+    BOOST_OUTCOME_TRY(check_rows(block.observations()));
+    block.set_checked();
+  }
   const double bend = options.loss_sigmas > 0 ? options.loss_sigmas : default_bend(options.loss);
   Unknowns at;
   at << start.position_m, options.estimate_bias ? start.bias_m : 0.0;
@@ -111,6 +115,8 @@ Result<AnchorMinimum> descend_from(RangeBlock& block, const WarmStart& start, co
   return minimum;
 }
 
+}  // namespace
+
 Result<AnchorMinimum> descend_to_minimum(RangeBlock& block, const Eigen::Vector3d& start,
                                          const SolverOptions& options, double scale_tolerance_m) {
   BOOST_OUTCOME_TRY(auto minimum,
@@ -123,12 +129,10 @@ Result<AnchorMinimum> descend_to_minimum(RangeBlock& block, const Eigen::Vector3
   return minimum;
 }
 
-}  // namespace
-
 Result<AnchorMinimum> descend_to_minimum(std::span<const Observation> observations,
                                          const Eigen::Vector3d& start, const SolverOptions& options) {
   RangeBlock block(observations);
-  return descend_to_minimum(block, start, options, k_scale_tolerance_m);
+  return descend_to_minimum(block, start, options);
 }
 
 Result<AnchorFit> solve_block(RangeBlock& block, const WarmStart& start, const SolverOptions& options,

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <utility>
 
 // Vectors pass between functions here, all of which are inlined; nobody else sees how.
 #pragma GCC diagnostic ignored "-Wpsabi"
@@ -111,7 +112,7 @@ struct Columns {
 };
 
 /// Lines of sight and distances first, then what follows from the curve at them.
-ANCHORD_LINES_INLINE void aim(const At& at, Places& p, Places::Numbers& far_m) {
+ANCHORD_LINES_INLINE void aim(const At& at, Places& p, Places::Numbers& far_m, const Columns& out) {
   for (std::size_t i = 0; i < p.n; i += k_lanes) {
     const Four up_m = load(&p.up_m[i]);
     Four x = load(&p.x_m[i]), y = load(&p.y_m[i]), z = load(&p.z_m[i]);
@@ -122,6 +123,9 @@ ANCHORD_LINES_INLINE void aim(const At& at, Places& p, Places::Numbers& far_m) {
       y += up_m * load(&p.uy[i]) + at.forward_m * load(&p.fy[i]) + at.left_m * load(&p.ly[i]);
       z += up_m * load(&p.uz[i]) + at.forward_m * load(&p.fz[i]) + at.left_m * load(&p.lz[i]);
     }
+    store(out.to[JointLines::antenna_x] + i, x);
+    store(out.to[JointLines::antenna_y] + i, y);
+    store(out.to[JointLines::antenna_z] + i, z);
     x -= at.anchor_m[0];
     y -= at.anchor_m[1];
     z -= at.anchor_m[2];
@@ -159,30 +163,39 @@ ANCHORD_LINES_INLINE void derive(const At& at, const Places& p, const Places::Nu
   }
 }
 
-/// Sums of products of the lines' columns; 1 stands for the derivatives by delay and bias.
-constexpr std::size_t k_summed = 10, k_products = k_summed * (k_summed + 1) / 2;
-struct Sums {
-  alignas(32) std::array<Four, k_products> products{};
+/// Sums of the products of columns two by two, row by row of the upper half. As many as find room in
+/// registers are summed while all rows pass.
+struct Products {
+  std::span<const double* const> columns;
+  const double* weights;
+  std::size_t padded;
+  double* out;
 };
-ANCHORD_LINES_INLINE void multiply(const JointLines& lines, const double* weights, Sums& out) {
-  constexpr std::array columns{
-      JointLines::x,   JointLines::y,     JointLines::z,       JointLines::n_columns, JointLines::curve,
-      JointLines::lag, JointLines::lever, JointLines::forward, JointLines::left,      JointLines::residual};
-  std::array<const double*, k_summed> from;
-  for (std::size_t i = 0; i < k_summed; ++i)
-    from[i] = columns[i] == JointLines::n_columns ? nullptr : lines.begin(columns[i]);
-  Four* const sums = out.products.data();
-  for (std::size_t at = 0; at < lines.padded(); at += k_lanes) {
-    alignas(32) std::array<Four, k_summed> values;
-    for (std::size_t i = 0; i < k_summed; ++i)
-      values[i] = from[i] == nullptr ? Four{1, 1, 1, 1} : load(from[i] + at);
-    const Four weight = load(weights + at);
-    Four* product = sums;
-    for (std::size_t i = 0; i < k_summed; ++i) {
-      const Four weighed = weight * values[i];
-      for (std::size_t j = i; j < k_summed; ++j) *product++ += weighed * values[j];
-    }
+constexpr std::size_t k_most_sums = 10;
+/// One column by `many`.
+template <std::size_t many>
+ANCHORD_LINES_INLINE void multiply_by(const double* column, const double* const* columns, const Products& p,
+                                      double* out) {
+  std::array<Four, many> sums{};
+  for (std::size_t i = 0; i < p.padded; i += k_lanes) {
+    const Four weighed = load(p.weights + i) * load(column + i);
+    for (std::size_t j = 0; j < many; ++j) sums[j] += weighed * load(columns[j] + i);
   }
+  for (std::size_t j = 0; j < many; ++j) out[j] = (sums[j][0] + sums[j][1]) + (sums[j][2] + sums[j][3]);
+}
+template <std::size_t... many>
+ANCHORD_LINES_INLINE void multiply_by_first(std::size_t n, const double* column, const double* const* columns,
+                                            const Products& p, double* out, std::index_sequence<many...>) {
+  (void)((n == many + 1 && (multiply_by<many + 1>(column, columns, p, out), true)) || ...);
+}
+ANCHORD_LINES_INLINE void multiply(const Products& p) {
+  double* out = p.out;
+  for (std::size_t i = 0; i < p.columns.size(); ++i)
+    for (std::size_t j = i; j < p.columns.size(); j += k_most_sums) {
+      const std::size_t n = std::min(k_most_sums, p.columns.size() - j);
+      multiply_by_first(n, p.columns[i], &p.columns[j], p, out, std::make_index_sequence<k_most_sums>());
+      out += n;
+    }
 }
 ANCHORD_LINES_INLINE void weigh(const JointLines& lines, double variance_m2, double usual_m2, double cut_off,
                                 double* to) {
@@ -198,30 +211,28 @@ ANCHORD_LINES_INLINE void weigh(const JointLines& lines, double variance_m2, dou
   }
 }
 
-void aim_plain(const At& at, Places& p, Places::Numbers& far_m) { aim(at, p, far_m); }
+void aim_plain(const At& at, Places& p, Places::Numbers& far_m, const Columns& out) {
+  aim(at, p, far_m, out);
+}
 void derive_plain(const At& at, const Places& p, const Places::Numbers& far_m, const Places::Numbers& curve,
                   const Places::Numbers& slope, const Columns& out) {
   derive(at, p, far_m, curve, slope, out);
 }
-void multiply_plain(const JointLines& lines, const double* weights, Sums& out) {
-  multiply(lines, weights, out);
-}
+void multiply_plain(const Products& products) { multiply(products); }
 void weigh_plain(const JointLines& lines, double variance_m2, double usual_m2, double cut_off, double* to) {
   weigh(lines, variance_m2, usual_m2, cut_off, to);
 }
 #if defined(__x86_64__)
-__attribute__((target("avx2"))) void aim_avx2(const At& at, Places& p, Places::Numbers& far_m) {
-  aim(at, p, far_m);
+__attribute__((target("avx2"))) void aim_avx2(const At& at, Places& p, Places::Numbers& far_m,
+                                              const Columns& out) {
+  aim(at, p, far_m, out);
 }
 __attribute__((target("avx2"))) void derive_avx2(const At& at, const Places& p, const Places::Numbers& far_m,
                                                  const Places::Numbers& curve, const Places::Numbers& slope,
                                                  const Columns& out) {
   derive(at, p, far_m, curve, slope, out);
 }
-__attribute__((target("avx2"))) void multiply_avx2(const JointLines& lines, const double* weights,
-                                                   Sums& out) {
-  multiply(lines, weights, out);
-}
+__attribute__((target("avx2"))) void multiply_avx2(const Products& products) { multiply(products); }
 __attribute__((target("avx2"))) void weigh_avx2(const JointLines& lines, double variance_m2, double usual_m2,
                                                 double cut_off, double* to) {
   weigh(lines, variance_m2, usual_m2, cut_off, to);
@@ -235,15 +246,11 @@ constexpr auto multiply_avx2 = multiply_plain;
 constexpr auto weigh_avx2 = weigh_plain;
 #endif
 
+constexpr int k_summed = 10;
+using Summed = Eigen::Matrix<double, k_summed, k_summed>;
+
 /// Into the blocks; arm: of the antenna, if it has one of its own.
-void add_sums(const Sums& sums, const JointRow& row, AnchorBlock& block, JointNormal& normal) {
-  Eigen::Matrix<double, k_summed, k_summed> all;
-  std::size_t product = 0;
-  for (int i = 0; i < static_cast<int>(k_summed); ++i)
-    for (int j = i; j < static_cast<int>(k_summed); ++j) {
-      const Four& s = sums.products[product++];
-      all(i, j) = all(j, i) = (s[0] + s[1]) + (s[2] + s[3]);
-    }
+void add_sums(const Summed& all, const JointRow& row, AnchorBlock& block, JointNormal& normal) {
   constexpr int residual = k_summed - 1;
   static_assert(k_shared_bias == 0 && k_shared_left == 5 && k_shared_antennas == 6);
   // Column of the sums that each shared unknown has.
@@ -269,7 +276,7 @@ JointLines::JointLines(const TagTrack& track, std::span<const JointRow> rows, co
                        const JointState::Anchor& anchor) {
   rows_.reserve(rows.size());
   padded_ = (rows.size() + k_lanes - 1) / k_lanes * k_lanes;
-  values_.resize(n_columns * padded_);
+  values_ = std::make_unique_for_overwrite<double[]>(n_columns * padded_);
   const At at{anchor.position_m, shared[k_shared_bias] + anchor.delay_m, shared[k_shared_curve],
               shared[k_shared_forward], shared[k_shared_left]};
   Places places;
@@ -277,13 +284,13 @@ JointLines::JointLines(const TagTrack& track, std::span<const JointRow> rows, co
   std::size_t done = 0;
   const auto finish = [&] {
     places.fill_group();
-    (k_wide ? aim_avx2 : aim_plain)(at, places, far_m);
+    Columns to;
+    for (std::size_t c = 0; c < n_columns; ++c) to.to[c] = values_.get() + c * padded_ + done;
+    (k_wide ? aim_avx2 : aim_plain)(at, places, far_m, to);
     for (std::size_t i = 0; i < (places.n + k_lanes - 1) / k_lanes * k_lanes; ++i) {
       curve_at[i] = range_curve(far_m[i]);
       slope[i] = curve_at[i] > 0 ? 1.0 + at.curve_m / far_m[i] : 1.0;
     }
-    Columns to;
-    for (std::size_t c = 0; c < n_columns; ++c) to.to[c] = values_.data() + c * padded_ + done;
     (k_wide ? derive_avx2 : derive_plain)(at, places, far_m, curve_at, slope, to);
     done += places.n;
     places.n = 0;
@@ -304,8 +311,23 @@ JointLines::JointLines(const TagTrack& track, std::span<const JointRow> rows, co
   if (places.n > 0) finish();
   // What fills the last group weighs nothing, and is a number.
   for (std::size_t c = 0; c < n_columns; ++c)
-    std::fill(values_.begin() + static_cast<std::ptrdiff_t>(c * padded_ + done),
-              values_.begin() + static_cast<std::ptrdiff_t>((c + 1) * padded_), 0.0);
+    std::fill(values_.get() + c * padded_ + done, values_.get() + (c + 1) * padded_, 0.0);
+}
+
+JointLine JointLines::line(std::size_t i) const {
+  JointLine out;
+  out.residual_m = of(residual)[i];
+  out.position_variance_m2 = of(variance)[i];
+  out.by_anchor << of(x)[i], of(y)[i], of(z)[i], 1.0;
+  out.antenna_m << of(antenna_x)[i], of(antenna_y)[i], of(antenna_z)[i];
+  out.by_shared[k_shared_bias] = 1.0;
+  out.by_shared[k_shared_curve] = of(curve)[i];
+  out.by_shared[k_shared_lag] = of(lag)[i];
+  out.by_shared[k_shared_lever] = of(lever)[i];
+  out.by_shared[k_shared_forward] = of(forward)[i];
+  out.by_shared[k_shared_left] = of(left)[i];
+  if (const auto& arm = rows_[i]->arm) out.by_shared[k_shared_antennas + *arm] = of(lever)[i];
+  return out;
 }
 
 std::vector<double> tukey_weights(const JointLines& lines, double variance_m2, double usual_m2,
@@ -316,10 +338,28 @@ std::vector<double> tukey_weights(const JointLines& lines, double variance_m2, d
   return out;
 }
 
+std::vector<double> weighted_products(std::span<const double* const> columns,
+                                      std::span<const double> weights) {
+  const std::size_t n = columns.size();
+  std::vector<double> upper(n * (n + 1) / 2), out(n * n);
+  (k_wide ? multiply_avx2 : multiply_plain)({columns, weights.data(), weights.size(), upper.data()});
+  const double* next = upper.data();
+  for (std::size_t i = 0; i < n; ++i)
+    for (std::size_t j = i; j < n; ++j) out[i * n + j] = out[j * n + i] = *next++;
+  return out;
+}
+
 void add_lines(const JointLines& lines, std::span<const double> weights, double unit, AnchorBlock& block,
                JointNormal& normal) {
   const auto rows = lines.rows();
   std::vector<double> own(lines.padded());
+  const std::vector<double> ones(lines.padded(), 1.0);  // the derivatives by delay and bias
+  const std::array<const double*, k_summed> columns{
+      lines.begin(JointLines::x),     lines.begin(JointLines::y),
+      lines.begin(JointLines::z),     ones.data(),
+      lines.begin(JointLines::curve), lines.begin(JointLines::lag),
+      lines.begin(JointLines::lever), lines.begin(JointLines::forward),
+      lines.begin(JointLines::left),  lines.begin(JointLines::residual)};
   std::vector<bool> added(rows.size());
   // Antennas with arms of their own each by themselves, and all others together.
   for (std::size_t first = 0; first < rows.size(); ++first) {
@@ -329,9 +369,8 @@ void add_lines(const JointLines& lines, std::span<const double> weights, double 
       own[i] = same ? weights[i] * unit : 0.0;
       if (same) added[i] = true;
     }
-    Sums sums;
-    (k_wide ? multiply_avx2 : multiply_plain)(lines, own.data(), sums);
-    add_sums(sums, *rows[first], block, normal);
+    const std::vector<double> sums = weighted_products(columns, own);
+    add_sums(Eigen::Map<const Summed>(sums.data()), *rows[first], block, normal);
   }
 }
 

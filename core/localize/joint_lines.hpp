@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -13,8 +14,24 @@ namespace anchord {
 /// has.
 class JointLines {
  public:
-  /// The derivatives by bias and delay are 1; an antenna's own arm is seen as the common one is.
-  enum Column : std::size_t { x, y, z, curve, lag, lever, forward, left, residual, variance, n_columns };
+  /// The derivatives by bias and delay are 1; an antenna's own arm is seen as the common one is. antenna_:
+  /// where it was, metres.
+  enum Column : std::size_t {
+    x,
+    y,
+    z,
+    curve,
+    lag,
+    lever,
+    forward,
+    left,
+    residual,
+    variance,
+    antenna_x,
+    antenna_y,
+    antenna_z,
+    n_columns
+  };
 
   JointLines(const TagTrack& track, std::span<const JointRow> rows, const SharedVector& shared,
              const JointState::Anchor& anchor);
@@ -23,17 +40,19 @@ class JointLines {
   /// Those that the track has a place for, in their order.
   std::span<const JointRow* const> rows() const { return rows_; }
   std::span<const double> of(Column column) const { return {begin(column), size()}; }
-  std::span<double> of(Column column) { return {values_.data() + column * padded_, size()}; }
+  std::span<double> of(Column column) { return {values_.get() + column * padded_, size()}; }
+  /// One of them as linearise() gives it.
+  JointLine line(std::size_t i) const;
   /// The others by TrackRefusal.
   const std::array<std::size_t, 4>& refused() const { return refused_; }
   /// As many as there are rows in whole groups of four.
   std::size_t padded() const { return padded_; }
-  const double* begin(Column column) const { return values_.data() + column * padded_; }
+  const double* begin(Column column) const { return values_.get() + column * padded_; }
 
  private:
   std::vector<const JointRow*> rows_;
   std::size_t padded_{};
-  std::vector<double> values_;
+  std::unique_ptr<double[]> values_;
   std::array<std::size_t, 4> refused_{};
 };
 
@@ -43,6 +62,11 @@ class JointLines {
 /// cut_off      sigmas from where on a row weighs nothing
 std::vector<double> tukey_weights(const JointLines& lines, double variance_m2, double usual_m2,
                                   double cut_off);
+
+/// Weighted sums of the products of columns two by two: a symmetric matrix.
+/// columns  each as long as the weights, whole groups of four
+std::vector<double> weighted_products(std::span<const double* const> columns,
+                                      std::span<const double> weights);
 
 /// Adds the weighted sums of products of the lines to the blocks.
 /// weights  one for each row, all times `unit`

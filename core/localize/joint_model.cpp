@@ -281,11 +281,18 @@ JointNormal build_normal(const FlightRows& flight, const JointState& state, cons
 
 std::vector<Observation> observations_of(const FlightRows& flight, const AnchorRows& anchor,
                                          const SharedVector& shared, std::size_t most, double sigma_m) {
-  std::vector<Observation> all;
-  for (const JointRow& row : anchor.rows) {
+  std::vector<const JointRow*> placed;
+  placed.reserve(anchor.rows.size());
+  for (const JointRow& row : anchor.rows)
+    if (flight.track.interval_at(row.t_s + shared[k_shared_lag]).refused == TrackRefusal::none)
+      placed.push_back(&row);
+  const std::size_t n = std::min(placed.size(), most);
+  std::vector<Observation> out;
+  out.reserve(n);
+  for (std::size_t i = 0; i < n; ++i) {
+    const JointRow& row = *placed[i * placed.size() / n];
     const TagPoint point = flight.track.at(row.t_s + shared[k_shared_lag], row.lever_arm_body_m);
-    if (point.refused != TrackRefusal::none) continue;
-    Observation o;
+    Observation& o = out.emplace_back();
     o.tag_m = antenna_of(point, row, shared);
     o.distance_m = row.distance_m - shared[k_shared_bias];
     o.distance_m -= shared[k_shared_curve] * range_curve(o.distance_m);
@@ -294,12 +301,8 @@ std::vector<Observation> observations_of(const FlightRows& flight, const AnchorR
       o.distance_m -= expected_error_m(*row.error_model);
       o.sigma_m = std::hypot(sigma_m, (1.0 - row.error_model->p_los) * row.error_model->nlos_tail_m);
     }
-    all.push_back(o);
   }
-  if (all.size() <= most) return all;
-  std::vector<Observation> few;
-  for (std::size_t i = 0; i < most; ++i) few.push_back(all[i * all.size() / most]);
-  return few;
+  return out;
 }
 
 std::vector<LevelSample> levels_of(const FlightRows& flight, const AnchorRows& anchor,

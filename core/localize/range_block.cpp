@@ -23,6 +23,7 @@ ANCHORD_INLINE Four load(const double* from) {
   std::memcpy(&out, from, sizeof out);
   return out;
 }
+ANCHORD_INLINE void store(double* to, Four value) { std::memcpy(to, &value, sizeof value); }
 ANCHORD_INLINE Four root(Four a) {
   Four out;
   for (std::size_t i = 0; i < k_lanes; ++i) out[i] = __builtin_sqrt(a[i]);
@@ -89,13 +90,29 @@ struct Shape<Loss::cauchy> {
   }
 };
 
-/// The sum of rho, rows that share a factor.
+struct Rows {
+  const double *x_m, *y_m, *z_m, *distance_m, *inverse_sigma, *factor2;
+  std::size_t count;  ///< whole groups
+  bool one_factor;
+};
+
+/// What some rows add to the sums, before it is multiplied out. Roots and quotients wait for one another
+/// within a row; where nothing else is done between, those of several rows are under way at once.
+struct Terms {
+  static constexpr std::size_t most = 64;
+  using Numbers = std::array<double, most>;
+  alignas(32) Numbers ux, uy, uz, w, c, pull, sphere, rho;
+};
+
+/// The sum of rho.
 template <Loss loss>
 class Cost {
  public:
   Cost(double, bool) {}
-  ANCHORD_INLINE void add(Four rho, Four factor2) { total_ += factor2 * rho; }
-  double rho() { return sum(total_); }
+  ANCHORD_INLINE void add(const Terms& terms, std::size_t n, const double* factor2) {
+    for (std::size_t k = 0; k < n; k += k_lanes) total_ += load(factor2 + k) * load(&terms.rho[k]);
+  }
+  double rho() const { return sum(total_); }
 
  private:
   Four total_{};
@@ -105,63 +122,66 @@ template <>
 class Cost<Loss::cauchy> {
  public:
   Cost(double bend, bool one_factor) : k2_(bend * bend), one_factor_(one_factor) {}
-  ANCHORD_INLINE void add(Four rho, Four factor2) {
+  ANCHORD_INLINE void add(const Terms& terms, std::size_t n, const double* factor2) {
     if (!one_factor_) {
-      for (std::size_t i = 0; i < k_lanes; ++i) total_ += factor2[i] * std::log(rho[i]);
+      for (std::size_t i = 0; i < n; ++i) total_ += factor2[i] * std::log(terms.rho[i]);
       return;
     }
-    product_ *= rho;
-    bool large = false;
-    for (std::size_t i = 0; i < k_lanes; ++i) large = large || !(product_[i] < 1e150);
-    if (large || ++n_ == 16) take_logarithm();
+    Four most{}, product = four(1.0);
+    for (std::size_t k = 0; k < n; k += k_lanes) {
+      const Four rho = load(&terms.rho[k]);
+      most = rho > most ? rho : most;
+      product *= rho;
+    }
+    // So many below 1e9 multiply to less than the largest number there is.
+    static_assert(Terms::most / k_lanes <= 16);
+    bool modest = true;
+    for (std::size_t i = 0; i < k_lanes; ++i) modest = modest && most[i] < 1e9;
+    if (modest) {
+      for (std::size_t i = 0; i < k_lanes; ++i) total_ += std::log(product[i]);
+    } else {
+      for (std::size_t i = 0; i < n; ++i) total_ += std::log(terms.rho[i]);
+    }
   }
-  double rho() {
-    take_logarithm();
-    return k2_ * total_;
-  }
+  double rho() const { return k2_ * total_; }
 
  private:
-  void take_logarithm() {
-    for (std::size_t i = 0; i < k_lanes; ++i) total_ += std::log(product_[i]);
-    product_ = four(1.0);
-    n_ = 0;
-  }
   double k2_, total_{0};
   bool one_factor_;
-  int n_{0};
-  Four product_ = four(1.0);
-};
-
-struct Rows {
-  const double *x_m, *y_m, *z_m, *distance_m, *inverse_sigma, *factor2;
-  std::size_t count;  ///< whole groups
-  bool one_factor;
 };
 
 template <Loss loss>
-ANCHORD_INLINE void add_rows(const Rows& rows, const Unknowns& at, double bend, Sums& out) {
-  const Shape<loss> shape(bend);
-  Cost<loss> cost(bend, rows.one_factor);
-  Sums s;
-  for (std::size_t i = 0; i < rows.count; i += k_lanes) {
+ANCHORD_INLINE void find_terms(const Rows& rows, std::size_t begin, std::size_t n, const Unknowns& at,
+                               const Shape<loss>& shape, Terms& out) {
+  for (std::size_t k = 0; k < n; k += k_lanes) {
+    const std::size_t i = begin + k;
     const Four x = at[0] - load(rows.x_m + i), y = at[1] - load(rows.y_m + i), z = at[2] - load(rows.z_m + i);
     const Four distance = root(x * x + y * y + z * z);
     // On the tag itself there is no direction; any unit vector is a subgradient, up is as good as another.
     const auto apart = distance > 1e-9;
     const Four inverse = 1.0 / (apart ? distance : four(1.0));
-    const Four ux = apart ? x * inverse : four(0.0), uy = apart ? y * inverse : four(0.0),
-               uz = apart ? z * inverse : four(1.0);
     const Four inverse_sigma = load(rows.inverse_sigma + i), factor2 = load(rows.factor2 + i);
     const Four e_m = load(rows.distance_m + i) - distance - at[3];
     Four rho, weight, slope;
     shape.at(e_m * inverse_sigma, rho, weight, slope);
-    cost.add(rho, factor2);
     const Four information = factor2 * inverse_sigma * inverse_sigma;
-    const Four w = weight * information, c = slope * information, pull = w * e_m;
+    const Four w = weight * information, pull = w * e_m;
+    store(&out.ux[k], apart ? x * inverse : four(0.0));
+    store(&out.uy[k], apart ? y * inverse : four(0.0));
+    store(&out.uz[k], apart ? z * inverse : four(1.0));
+    store(&out.w[k], w);
+    store(&out.c[k], slope * information);
+    store(&out.pull[k], pull);
     // The sphere round the tag bends: d2 |a - q| = (I - u u^T) / |a - q|.
-    const Four sphere = distance > 1e-3 ? pull * inverse : four(0.0);
-    const Four cs = c + sphere;
-    const Four wx = w * ux, wy = w * uy, wz = w * uz, cx = cs * ux, cy = cs * uy, cz = cs * uz;
+    store(&out.sphere[k], distance > 1e-3 ? pull * inverse : four(0.0));
+    store(&out.rho[k], rho);
+  }
+}
+
+ANCHORD_INLINE void multiply(const Terms& t, std::size_t n, Sums& s) {
+  for (std::size_t k = 0; k < n; k += k_lanes) {
+    const Four ux = load(&t.ux[k]), uy = load(&t.uy[k]), uz = load(&t.uz[k]), w = load(&t.w[k]);
+    const Four wx = w * ux, wy = w * uy, wz = w * uz;
     s.w_xx += wx * ux;
     s.w_xy += wx * uy;
     s.w_xz += wx * uz;
@@ -172,21 +192,43 @@ ANCHORD_INLINE void add_rows(const Rows& rows, const Unknowns& at, double bend, 
     s.w_y += wy;
     s.w_z += wz;
     s.w += w;
+  }
+  for (std::size_t k = 0; k < n; k += k_lanes) {
+    const Four ux = load(&t.ux[k]), uy = load(&t.uy[k]), uz = load(&t.uz[k]), pull = load(&t.pull[k]);
+    const Four c = load(&t.c[k]);
     s.g_x += pull * ux;
     s.g_y += pull * uy;
     s.g_z += pull * uz;
     s.g += pull;
+    s.c_x += c * ux;
+    s.c_y += c * uy;
+    s.c_z += c * uz;
+    s.c += c;
+  }
+  for (std::size_t k = 0; k < n; k += k_lanes) {
+    const Four ux = load(&t.ux[k]), uy = load(&t.uy[k]), uz = load(&t.uz[k]), sphere = load(&t.sphere[k]);
+    const Four cs = load(&t.c[k]) + sphere, cx = cs * ux, cy = cs * uy, cz = cs * uz;
     s.c_xx += cx * ux;
     s.c_xy += cx * uy;
     s.c_xz += cx * uz;
     s.c_yy += cy * uy;
     s.c_yz += cy * uz;
     s.c_zz += cz * uz;
-    s.c_x += c * ux;
-    s.c_y += c * uy;
-    s.c_z += c * uz;
-    s.c += c;
     s.bend += sphere;
+  }
+}
+
+template <Loss loss>
+ANCHORD_INLINE void add_rows(const Rows& rows, const Unknowns& at, double bend, Sums& out) {
+  const Shape<loss> shape(bend);
+  Cost<loss> cost(bend, rows.one_factor);
+  Sums s;
+  Terms terms;
+  for (std::size_t begin = 0; begin < rows.count; begin += Terms::most) {
+    const std::size_t n = std::min(Terms::most, rows.count - begin);
+    find_terms(rows, begin, n, at, shape, terms);
+    cost.add(terms, n, rows.factor2 + begin);
+    multiply(terms, n, s);
   }
   s.rho = cost.rho();
   out = s;
@@ -222,7 +264,7 @@ ANCHORD_INLINE void project(const ScaleRows& rows, const Unknowns& at, double* i
                        y * (y * load(c[3] + i) + 2.0 * z * load(c[4] + i)) + z * z * load(c[5] + i);
     const Four variance = apart ? along / (apart ? distance2 : four(1.0)) : load(c[5] + i);
     const Four inverse = 1.0 / root(load(rows.sigma2_m2 + i) + (variance > 0.0 ? variance : four(0.0)));
-    std::memcpy(inverse_sigma + i, &inverse, sizeof inverse);
+    store(inverse_sigma + i, inverse);
   }
 }
 

@@ -38,6 +38,9 @@ class RangeBlock {
   /// Range less what is predicted at a place, in the order of the observations.
   std::vector<double> residuals_m(const Unknowns& at) const;
   std::span<const Observation> observations() const { return observations_; }
+  /// Whether all observations were found usable: whoever solves them from several places asks once.
+  bool checked() const { return checked_; }
+  void set_checked() { checked_ = true; }
 
  private:
   std::span<const Observation> observations_;
@@ -45,7 +48,7 @@ class RangeBlock {
   std::vector<double> sigma2_m2_;
   std::array<std::vector<double>, 6> covariance_m2_;  ///< ee, en, eu, nn, nu, uu of the tag; empty: a ball's
   std::vector<double> inverse_sigma_, factor2_;       ///< 0 in the padding, where a row then weighs nothing
-  bool one_scale_{true}, one_factor_{true};
+  bool one_scale_{true}, one_factor_{true}, checked_{false};
   std::optional<Weights> scaled_{};
 };
 

@@ -98,16 +98,20 @@ Result<void> SolverOptions::check() const {
   return boost::outcome_v2::success();
 }
 
-Result<void> check_problem(std::span<const Observation> observations, const Eigen::Vector3d& start,
-                           const SolverOptions& options) {
+Result<void> check_asked(std::size_t n_observations, const Eigen::Vector3d& start,
+                         const SolverOptions& options) {
   BOOST_OUTCOME_TRY(options.check());
   // With a prior the bias needs no range of its own; without one there is none here.
   const std::size_t needed = options.dims == Dims::two ? 3 : 4;
-  if (observations.size() < needed) {
+  if (n_observations < needed) {
     return make_error(Errc::too_few_observations,
-                      std::to_string(observations.size()) + " ranges, need " + std::to_string(needed));
+                      std::to_string(n_observations) + " ranges, need " + std::to_string(needed));
   }
   if (!start.allFinite()) return make_error(Errc::invalid_argument, "the start is not finite");
+  return boost::outcome_v2::success();
+}
+
+Result<void> check_rows(std::span<const Observation> observations) {
   // A number that is not finite stays so in a sum, also times zero; then the rows are asked one by one.
   double nothing = 0, least_sigma_m = 1.0;
   for (const auto& o : observations) {
@@ -125,6 +129,12 @@ Result<void> check_problem(std::span<const Observation> observations, const Eige
     }
   }
   return boost::outcome_v2::success();
+}
+
+Result<void> check_problem(std::span<const Observation> observations, const Eigen::Vector3d& start,
+                           const SolverOptions& options) {
+  BOOST_OUTCOME_TRY(check_asked(observations.size(), start, options));
+  return check_rows(observations);
 }
 
 namespace {

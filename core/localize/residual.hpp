@@ -41,7 +41,10 @@ double residual_m(const Observation& o, const Unknowns& at, Eigen::Vector4d* der
 double robust_residual(const Observation& o, const RowScale& scale, const Unknowns& at, Loss loss,
                        double bend, Eigen::Vector4d* derivative);
 
-/// Checks shared by both solvers.
+/// Checks shared by both solvers: of all rows, and of what is asked of so many of them.
+Result<void> check_rows(std::span<const Observation> observations);
+Result<void> check_asked(std::size_t n_observations, const Eigen::Vector3d& start,
+                         const SolverOptions& options);
 Result<void> check_problem(std::span<const Observation> observations, const Eigen::Vector3d& start,
                            const SolverOptions& options);
 /// Covariance, residuals and cost at the optimum; weak_geometry when the normal matrix is singular.

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/base/median.hpp"
+#include "core/localize/joint_lines.hpp"
 #include "core/localize/widen.hpp"
 
 namespace anchord {
@@ -42,11 +43,12 @@ std::vector<Line> lines_of(const FlightRows& flight, const FlightOptions& option
                            std::size_t index) {
   const AnchorBlock& block = fit.normal.anchors[index];
   const double scale2 = block.scale_m * block.scale_m;
+  const JointLines all(flight.track, flight.anchors[index].rows, fit.state.shared, fit.state.anchors[index]);
   std::vector<Line> lines;
-  for (const JointRow& row : flight.anchors[index].rows) {
-    if (row.error_model) continue;
-    const JointLine at = linearise(flight.track, row, fit.state.shared, fit.state.anchors[index]);
-    if (at.refused != TrackRefusal::none) continue;
+  lines.reserve(all.size());
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    if (all.rows()[i]->error_model) continue;
+    const JointLine at = all.line(i);
     const double variance_m2 =
         scale2 + std::max(at.position_variance_m2 - block.usual_position_variance_m2, 0.0);
     const double weight = robust_weight(at.residual_m / std::sqrt(variance_m2), options);

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "core/localize/joint_lines.hpp"
 #include "core/localize/widen.hpp"
 
 namespace anchord {
@@ -47,10 +48,10 @@ Bins by_bearing(const FlightRows& flight, const FlightOptions& options, const Jo
   const JointState::Anchor& anchor = fit.state.anchors[index];
   const double wide_m = k_wide_scales * fit.normal.anchors[index].scale_m;
   Bins bins{};
-  for (const JointRow& row : flight.anchors[index].rows) {
-    if (row.error_model) continue;
-    const JointLine at = linearise(flight.track, row, fit.state.shared, anchor);
-    if (at.refused != TrackRefusal::none) continue;
+  const JointLines lines(flight.track, flight.anchors[index].rows, fit.state.shared, anchor);
+  for (std::size_t i = 0; i < lines.size(); ++i) {
+    if (lines.rows()[i]->error_model) continue;
+    const JointLine at = lines.line(i);
     const double size_m = std::abs(at.residual_m);
     const double weight = size_m <= wide_m ? 1.0 : wide_m * wide_m / (size_m * size_m);
     const Eigen::Vector3d ray = at.antenna_m - anchor.position_m;

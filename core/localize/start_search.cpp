@@ -8,6 +8,7 @@
 #include "core/localize/joint_model.hpp"
 #include "core/localize/linear.hpp"
 #include "core/localize/solver.hpp"
+#include "core/localize/warm_solve.hpp"
 
 namespace anchord {
 namespace {
@@ -63,9 +64,10 @@ StartSearch search_start(const FlightRows& flight, const AnchorRows& anchor, con
       std::max(2.0 * options.correlation_s * static_cast<double>(levels.size()) / span_s, 1.0);
   auto starts = start_candidates(rows, options.dims);
   if (const auto told = told_start(anchor.id, rows, priors, options)) starts = {*told};
+  RangeBlock block(rows);
   for (Eigen::Vector3d start : starts) {
     if (height_m) start.z() = *height_m;
-    auto end = descend_to_minimum(rows, start, settings);
+    auto end = descend_to_minimum(block, start, settings);
     if (!end) continue;
     // The mirror fits as well: a prior, told in the same unit, is what decides where to begin.
     AnchorMinimum& minimum = end.value();

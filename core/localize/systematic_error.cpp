@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <limits>
 
+#include "core/localize/joint_lines.hpp"
 #include "core/localize/weighed_row.hpp"
 #include "core/localize/widen.hpp"
 
@@ -83,12 +84,12 @@ Middle middle_of(const FlightRows& flight, const JointState& state) {
   double from_s = std::numeric_limits<double>::infinity(), to_s = -from_s;
   for (std::size_t i = 0; i < flight.anchors.size(); ++i) {
     if (!state.anchors[i].active) continue;
-    for (const JointRow& row : flight.anchors[i].rows) {
-      const TagPoint point = flight.track.at(row.t_s + state.shared[k_shared_lag], row.lever_arm_body_m);
-      if (point.refused != TrackRefusal::none) continue;
-      ups_m.push_back(antenna_of(point, row, state.shared).z());
-      from_s = std::min(from_s, row.t_s);
-      to_s = std::max(to_s, row.t_s);
+    const JointLines lines(flight.track, flight.anchors[i].rows, state.shared, state.anchors[i]);
+    const auto of_rows_m = lines.of(JointLines::antenna_z);
+    ups_m.insert(ups_m.end(), of_rows_m.begin(), of_rows_m.end());
+    for (const JointRow* row : lines.rows()) {
+      from_s = std::min(from_s, row->t_s);
+      to_s = std::max(to_s, row->t_s);
     }
   }
   if (ups_m.empty()) return {};
@@ -103,9 +104,8 @@ struct Columns {
   double of(ErrorKind kind) const { return by[static_cast<int>(kind)]; }
 };
 
-Columns columns_of(const Middle& middle, const JointRow& row, const JointLine& line, double distance_m) {
-  return {{distance_m, line.antenna_m.z() > middle.up_m ? 1.0 : 0.0,
-           (row.t_s - middle.from_s) / middle.length_s}};
+Columns columns_of(const Middle& middle, const JointRow& row, double antenna_up_m, double distance_m) {
+  return {{distance_m, antenna_up_m > middle.up_m ? 1.0 : 0.0, (row.t_s - middle.from_s) / middle.length_s}};
 }
 
 std::vector<Question> questions_of(const FlightRows& flight, const JointFit& fit) {
@@ -165,29 +165,99 @@ double weight_per_m2(const WeighedRow& by, const JointRow& row, const JointLine&
   return (over2 <= 1 ? 1.0 : 1.0 / over2) / (variance_m2 * block.kappa);
 }
 
+/// Columns of Sums beside those of the lines, and weights: 0 in whole groups of four beyond the rows.
+struct AskedColumns {
+  std::vector<double> ones, near, factor, step, drift, residual, weight;
+  explicit AskedColumns(std::size_t padded)
+      : ones(padded, 1.0),
+        near(padded),
+        factor(padded),
+        step(padded),
+        drift(padded),
+        residual(padded),
+        weight(padded) {}
+};
+
+AskedColumns asked_columns(const ErrorTest::Given& given, std::size_t index, const JointLines& lines,
+                           Weighing weighing) {
+  const AnchorBlock& block = given.fit.normal.anchors[index];
+  const Eigen::Vector3d& anchor_m = given.fit.state.anchors[index].position_m;
+  AskedColumns out(lines.padded());
+  for (std::size_t i = 0; i < lines.size(); ++i) {
+    const JointRow& row = *lines.rows()[i];
+    JointLine line;
+    line.residual_m = lines.of(JointLines::residual)[i];
+    line.position_variance_m2 = lines.of(JointLines::variance)[i];
+    const WeighedRow by = weighed_row(row, line, block, block.scale_m, given.options);
+    const double weight = weight_per_m2(by, row, line, block, weighing);
+    if (!(weight > 0)) continue;
+    const Eigen::Vector3d antenna_m(lines.of(JointLines::antenna_x)[i], lines.of(JointLines::antenna_y)[i],
+                                    lines.of(JointLines::antenna_z)[i]);
+    const double distance_m = (antenna_m - anchor_m).norm();
+    const Columns asked = columns_of(given.middle, row, antenna_m.z(), distance_m);
+    out.near[i] = std::min(distance_m, k_near_m) - k_near_right_m;
+    out.factor[i] = asked.of(ErrorKind::factor);
+    out.step[i] = asked.of(ErrorKind::step);
+    out.drift[i] = asked.of(ErrorKind::drift);
+    out.residual[i] = by.residual_m;
+    out.weight[i] = weight;
+  }
+  return out;
+}
+
+/// The rows of one antenna, whose arm of its own, where it has one, is seen as the common one is.
+Sums sums_of_antenna(const JointLines& lines, const AskedColumns& columns, std::span<const double> weights,
+                     const std::optional<std::int8_t>& arm) {
+  using L = JointLines;
+  const std::array<const double*, 14> distinct{
+      lines.begin(L::x),     lines.begin(L::y),      lines.begin(L::z),     columns.ones.data(),
+      lines.begin(L::curve), lines.begin(L::lag),    lines.begin(L::lever), lines.begin(L::forward),
+      lines.begin(L::left),  columns.near.data(),    columns.factor.data(), columns.step.data(),
+      columns.drift.data(),  columns.residual.data()};
+  constexpr int ones = 3, lever = 6;
+  // Of each column of Sums, among those; -1: nothing.
+  std::array<int, k_own + k_rest> from{0, 1, 2, ones, ones, 4, 5, lever, 7, 8};
+  static_assert(k_own + k_shared_antennas == 10 && k_shared_curve == 1 && k_shared_lag == 2 &&
+                k_shared_lever == 3 && k_shared_forward == 4 && k_shared_left == 5);
+  for (int i = k_own + k_shared_antennas; i < k_own + k_shared_size; ++i)
+    from[static_cast<std::size_t>(i)] = -1;
+  if (arm) from[static_cast<std::size_t>(k_own + k_shared_antennas + *arm)] = lever;
+  for (int i = 0; i < 5; ++i) from[static_cast<std::size_t>(k_own + k_near + i)] = 9 + i;
+  const std::vector<double> products = weighted_products(distinct, weights);
+  Sums out = Sums::Zero();
+  for (int i = 0; i < k_own + k_rest; ++i)
+    for (int j = 0; j < k_own + k_rest; ++j) {
+      const int a = from[static_cast<std::size_t>(i)], b = from[static_cast<std::size_t>(j)];
+      if (a >= 0 && b >= 0)
+        out(i, j) = products[static_cast<std::size_t>(a) * distinct.size() + static_cast<std::size_t>(b)];
+    }
+  return out;
+}
+
 ErrorTest::Anchor ErrorTest::anchor_of(std::size_t index, Weighing weighing) const {
-  const auto& [flight, fit, prior, options, middle] = given_;
-  const JointState::Anchor& anchor = fit.state.anchors[index];
-  const AnchorBlock& block = fit.normal.anchors[index];
+  const FlightRows& flight = given_.flight;
+  const JointState::Anchor& anchor = given_.fit.state.anchors[index];
   Anchor out;
   out.by_antenna.assign(flight.antennas.size() + 1, Sums::Zero());
   if (!anchor.active) return out;
-  for (const JointRow& row : flight.anchors[index].rows) {
-    const JointLine line = linearise(flight.track, row, fit.state.shared, anchor);
-    if (line.refused != TrackRefusal::none) continue;
-    const WeighedRow by = weighed_row(row, line, block, block.scale_m, options);
-    const double weight = weight_per_m2(by, row, line, block, weighing);
-    if (!(weight > 0)) continue;
-    const double distance_m = (line.antenna_m - anchor.position_m).norm();
-    Eigen::Matrix<double, k_own + k_rest, 1> columns;
-    const Columns asked = columns_of(middle, row, line, distance_m);
-    columns << line.by_anchor, line.by_shared, std::min(distance_m, k_near_m) - k_near_right_m, asked.by[0],
-        asked.by[1], asked.by[2], by.residual_m;
-    out.by_antenna[antenna_of(flight, row)].noalias() += weight * columns * columns.transpose();
+  const JointLines lines(flight.track, flight.anchors[index].rows, given_.fit.state.shared, anchor);
+  const AskedColumns columns = asked_columns(given_, index, lines, weighing);
+  std::vector<std::size_t> antennas;
+  antennas.reserve(lines.size());
+  for (const JointRow* row : lines.rows()) antennas.push_back(antenna_of(flight, *row));
+  std::vector<double> weights(lines.padded());
+  for (std::size_t antenna = 0; antenna < out.by_antenna.size(); ++antenna) {
+    const JointRow* one = nullptr;
+    for (std::size_t i = 0; i < antennas.size(); ++i) {
+      weights[i] = antennas[i] == antenna ? columns.weight[i] : 0.0;
+      if (antennas[i] == antenna) one = lines.rows()[i];
+    }
+    if (one != nullptr) out.by_antenna[antenna] = sums_of_antenna(lines, columns, weights, one->arm);
   }
   Eigen::Matrix4d own = Eigen::Matrix4d::Zero();
   for (const Sums& sums : out.by_antenna) own += sums.topLeftCorner<k_own, k_own>();
-  out.own_inverse = add_anchor_priors(flight.anchors[index].id, anchor, options, own, out.prior_gradient);
+  out.own_inverse =
+      add_anchor_priors(flight.anchors[index].id, anchor, given_.options, own, out.prior_gradient);
   return out;
 }
 
@@ -268,7 +338,7 @@ FlightRows corrected(const ErrorTest::Given& given, const Question& question, do
       }
       const JointLine line =
           linearise(given.flight.track, row, given.fit.state.shared, given.fit.state.anchors[i]);
-      row.distance_m -= value * columns_of(given.middle, row, line, 0).of(question.kind);
+      row.distance_m -= value * columns_of(given.middle, row, line.antenna_m.z(), 0).of(question.kind);
     }
   }
   return out;

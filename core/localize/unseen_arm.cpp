@@ -5,10 +5,12 @@
 #include <cmath>
 #include <cstdio>
 #include <numbers>
+#include <optional>
 #include <string>
 
 #include "core/localize/chi_square.hpp"
 #include "core/localize/flight_checks.hpp"
+#include "core/localize/joint_lines.hpp"
 #include "core/localize/widen.hpp"
 
 namespace anchord {
@@ -47,15 +49,23 @@ ArmResponse response_of(const JointFit& fit, const SharedPrior& prior) {
 /// Headings that an aircraft without attitude may have had, about a constant.
 enum class Heading : std::uint8_t { along_course, to_middle };
 
+std::optional<Eigen::Vector3d> place_at(const TagTrack& track, double t_s) {
+  const TrackInterval in = track.interval_at(t_s);
+  if (in.refused != TrackRefusal::none) return std::nullopt;
+  const double interval_s = in.later->t_s - in.before->t_s;
+  const double share = interval_s > 0 ? (t_s - in.before->t_s) / interval_s : 0.0;
+  return (1.0 - share) * in.before->position_m + share * in.later->position_m;
+}
+
 /// Direction in the plane at an instant; zero where there is none. middle_m  of the track
 Eigen::Vector3d direction_at(const FlightRows& flight, Heading heading, const Eigen::Vector3d& antenna_m,
                              const Eigen::Vector3d& middle_m, double t_s) {
   Eigen::Vector3d way = middle_m - antenna_m;
   if (heading == Heading::along_course) {
-    const TagPoint before = flight.track.at(t_s - k_course_s), after = flight.track.at(t_s + k_course_s);
-    if (before.refused != TrackRefusal::none || after.refused != TrackRefusal::none)
-      return Eigen::Vector3d::Zero();
-    way = after.position_m - before.position_m;
+    const auto before = place_at(flight.track, t_s - k_course_s);
+    const auto after = place_at(flight.track, t_s + k_course_s);
+    if (!before || !after) return Eigen::Vector3d::Zero();
+    way = *after - *before;
   }
   way.z() = 0;
   const double length_m = way.norm();
@@ -73,9 +83,10 @@ std::vector<AnchorByArm> response_with(Heading heading, const FlightRows& flight
   for (std::size_t i = 0; i < own.size(); ++i) {
     const AnchorBlock& block = fit.normal.anchors[i];
     if (!fit.state.anchors[i].active || !(block.scale_m > 0)) continue;
-    for (const JointRow& row : flight.anchors[i].rows) {
-      const JointLine line = linearise(flight.track, row, fit.state.shared, fit.state.anchors[i]);
-      if (line.refused != TrackRefusal::none) continue;
+    const JointLines lines(flight.track, flight.anchors[i].rows, fit.state.shared, fit.state.anchors[i]);
+    for (std::size_t k = 0; k < lines.size(); ++k) {
+      const JointRow& row = *lines.rows()[k];
+      const JointLine line = lines.line(k);
       const double weight = robust_weight(line.residual_m / block.scale_m, options) /
                             (block.kappa * block.scale_m * block.scale_m);
       const Eigen::Vector3d forward =

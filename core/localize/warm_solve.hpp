@@ -23,6 +23,11 @@ inline constexpr double k_scale_tolerance_m = 1e-9;
 Result<AnchorFit> solve_block(RangeBlock& block, const WarmStart& start, const SolverOptions& options,
                               double scale_tolerance_m = k_scale_tolerance_m);
 
+/// descend_to_minimum() likewise.
+Result<AnchorMinimum> descend_to_minimum(RangeBlock& block, const Eigen::Vector3d& start,
+                                         const SolverOptions& options,
+                                         double scale_tolerance_m = k_scale_tolerance_m);
+
 /// The fit of the lowest cost over many starts, whose bias is that of the prior. Descents end at `coarse_m`;
 /// only the best of those that settle is then solved to the end. errors: those of the last that failed.
 Result<AnchorFit> best_of_starts(RangeBlock& block, std::span<const Eigen::Vector3d> starts,

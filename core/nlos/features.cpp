@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace anchord::nlos {
 namespace {
@@ -11,58 +12,73 @@ namespace {
 constexpr double k_noise_floor_db = 7.4;
 constexpr double k_cir_noise_floor_db = 17.4;
 
-std::optional<double> positive(std::optional<double> value) {
-  return value && *value > 0 && std::isfinite(*value) ? value : std::nullopt;
+/// No level: what it is taken from or added to is none either, and FeatureVector::set leaves it out. Optional
+/// numbers handed on between functions are copied through memory, which was a fifth of all.
+constexpr double k_unknown = std::numeric_limits<double>::quiet_NaN();
+bool known(double level) { return !std::isnan(level); }
+
+/// 0: not known.
+double positive(const std::optional<double>& value) {
+  return value && *value > 0 && std::isfinite(*value) ? *value : 0.0;
 }
 
-double db20(double ratio) { return 20 * std::log10(ratio); }
+double db20(double ratio) { return 2 * decibels(ratio); }
 
-std::optional<double> difference(std::optional<double> a, std::optional<double> b) {
-  if (!a || !b) return std::nullopt;
-  return *a - *b;
+void set(FeatureVector& out, Feature feature, const std::optional<double>& value) {
+  if (value) out.set(feature, *value);
 }
 
-void set_levels(const DiagnosticSample& s, FeatureVector& out, std::optional<double>& rx,
-                std::optional<double>& fp) {
-  const auto n = positive(s.preamble_count);
-  const auto c = positive(s.cir_power);
+/// The registers of a sample, 0 where they are not known, and the levels that follow from them.
+struct Levels {
+  double preamble_count{}, cir_power{}, noise{};
+  double rx_dbm{k_unknown}, fp_dbm{k_unknown}, preamble_db{k_unknown};
+};
+
+void set_levels(const DiagnosticSample& s, Levels& levels, FeatureVector& out) {
+  const double n = levels.preamble_count = positive(s.preamble_count);
+  const double c = levels.cir_power = positive(s.cir_power);
   const bool amplitudes = s.fp_amp1 && s.fp_amp2 && s.fp_amp3;
-  rx = c && n ? received_dbm(*c, *n, s.prf) : s.rx_dbm;
-  fp = amplitudes && n ? first_path_dbm(*s.fp_amp1, *s.fp_amp2, *s.fp_amp3, *n, s.prf) : s.fp_dbm;
-  std::optional<double> d = difference(rx, fp);
-  if (c && amplitudes && !n) d = power_difference_db(*c, *s.fp_amp1, *s.fp_amp2, *s.fp_amp3);
-  if (s.cir && n) {  // computed from the CIR where no register said it
-    const double n2 = *n * *n;
-    if (!rx && s.cir->energy > 0) rx = 10 * std::log10(s.cir->energy / n2) - power_constant_db(s.prf);
-    if (!fp && s.cir->first_path_energy > 0)
-      fp = 10 * std::log10(s.cir->first_path_energy / n2) - power_constant_db(s.prf);
-    if (!d) d = difference(rx, fp);
+  double& rx = levels.rx_dbm;
+  double& fp = levels.fp_dbm;
+  rx = c > 0 && n > 0 ? received_dbm(c, n, s.prf).value_or(k_unknown) : s.rx_dbm.value_or(k_unknown);
+  fp = amplitudes && n > 0 ? first_path_dbm(*s.fp_amp1, *s.fp_amp2, *s.fp_amp3, n, s.prf).value_or(k_unknown)
+                           : s.fp_dbm.value_or(k_unknown);
+  double d = rx - fp;
+  if (c > 0 && amplitudes && !(n > 0))
+    d = power_difference_db(c, *s.fp_amp1, *s.fp_amp2, *s.fp_amp3).value_or(k_unknown);
+  if (s.cir && n > 0) {  // computed from the CIR where no register said it
+    const double n2 = n * n;
+    if (!known(rx) && s.cir->energy > 0) rx = decibels(s.cir->energy / n2) - power_constant_db(s.prf);
+    if (!known(fp) && s.cir->first_path_energy > 0)
+      fp = decibels(s.cir->first_path_energy / n2) - power_constant_db(s.prf);
+    if (!known(d)) d = rx - fp;
   }
+  if (n > 0) levels.preamble_db = db20(n);
   out.set(Feature::rx_dbm, rx);
   out.set(Feature::fp_dbm, fp);
   out.set(Feature::rx_minus_fp_db, d);
+  out.set(Feature::preamble_db, levels.preamble_db);
 }
 
-void set_noise(const DiagnosticSample& s, std::optional<double> rx, std::optional<double> preamble_db,
-               FeatureVector& out) {
-  auto noise = positive(s.std_noise);
+void set_noise(const DiagnosticSample& s, const Levels& levels, FeatureVector& out) {
+  double noise = positive(s.std_noise);
   double floor_db = k_noise_floor_db;
-  if (!noise && s.cir) {
-    noise = positive(s.cir->noise_rms);
+  if (!(noise > 0) && s.cir) {
+    noise = std::isfinite(s.cir->noise_rms) ? s.cir->noise_rms : 0.0;
     floor_db = k_cir_noise_floor_db;
   }
-  if (!noise) return;
-  const double noise_db = db20(*noise);
-  if (preamble_db) out.set(Feature::noise_excess_db, noise_db - 0.5 * *preamble_db - floor_db);
+  if (!(noise > 0)) return;
+  const double noise_db = db20(noise);
+  out.set(Feature::noise_excess_db, noise_db - 0.5 * levels.preamble_db - floor_db);
   if (s.fp_amp1 && s.fp_amp2 && s.fp_amp3) {
     const double top = std::max({*s.fp_amp1, *s.fp_amp2, *s.fp_amp3});
     if (top > 0) out.set(Feature::fp_snr_db, db20(top) - noise_db);
   }
-  if (rx && preamble_db)
-    out.set(Feature::total_snr_db, *rx + power_constant_db(s.prf) + *preamble_db - noise_db);
-  else if (const auto c = positive(s.cir_power))
-    out.set(Feature::total_snr_db, 10 * std::log10(*c * 131072.0) - noise_db);
-  if (const auto top = positive(s.max_noise)) out.set(Feature::max_noise_db, db20(*top) - noise_db);
+  if (known(levels.rx_dbm) && known(levels.preamble_db))
+    out.set(Feature::total_snr_db, levels.rx_dbm + power_constant_db(s.prf) + levels.preamble_db - noise_db);
+  else if (levels.cir_power > 0)
+    out.set(Feature::total_snr_db, decibels(levels.cir_power * 131072.0) - noise_db);
+  if (const double top = positive(s.max_noise); top > 0) out.set(Feature::max_noise_db, db20(top) - noise_db);
 }
 
 double quantile(std::vector<double>& sorted, double q) {
@@ -145,29 +161,26 @@ std::optional<double> FeatureVector::get(Feature feature) const {
 
 FeatureVector compute_features(const DiagnosticSample& s) {
   FeatureVector out;
-  std::optional<double> rx, fp;
-  set_levels(s, out, rx, fp);
-  std::optional<double> preamble_db;
-  if (const auto n = positive(s.preamble_count)) preamble_db = db20(*n);
-  out.set(Feature::preamble_db, preamble_db);
-  set_noise(s, rx, preamble_db, out);
-  if (const auto range = positive(s.range_m)) {
-    const double range_db = db20(*range);
-    out.set(Feature::range_m, *range);
+  Levels levels;
+  set_levels(s, levels, out);
+  set_noise(s, levels, out);
+  if (const double range_m = positive(s.range_m); range_m > 0) {
+    const double range_db = db20(range_m);
+    out.set(Feature::range_m, range_m);
     out.set(Feature::range_db, range_db);
-    if (rx) out.set(Feature::rx_free_space_db, *rx + range_db);
-    if (fp) out.set(Feature::fp_free_space_db, *fp + range_db);
+    out.set(Feature::rx_free_space_db, levels.rx_dbm + range_db);
+    out.set(Feature::fp_free_space_db, levels.fp_dbm + range_db);
   }
-  const auto f1 = positive(s.fp_amp1), f2 = positive(s.fp_amp2), f3 = positive(s.fp_amp3);
-  if (f1 && f2) out.set(Feature::fp_shape12_db, db20(*f1 / *f2));
-  if (f3 && f2) out.set(Feature::fp_shape32_db, db20(*f3 / *f2));
-  out.set(Feature::fp_index, s.fp_index ? s.fp_index
-                             : s.cir    ? std::optional{s.cir->first_path_idx}
-                                        : std::nullopt);
-  out.set(Feature::height_difference_m, s.height_difference_m);
-  out.set(Feature::heading_deg, s.heading_deg);
-  out.set(Feature::kurtosis, s.kurtosis);
+  if (const double f2 = positive(s.fp_amp2); f2 > 0) {
+    if (const double f1 = positive(s.fp_amp1); f1 > 0) out.set(Feature::fp_shape12_db, db20(f1 / f2));
+    if (const double f3 = positive(s.fp_amp3); f3 > 0) out.set(Feature::fp_shape32_db, db20(f3 / f2));
+  }
+  set(out, Feature::fp_index, s.fp_index);
+  set(out, Feature::height_difference_m, s.height_difference_m);
+  set(out, Feature::heading_deg, s.heading_deg);
+  set(out, Feature::kurtosis, s.kurtosis);
   if (s.cir) {
+    if (!s.fp_index) out.set(Feature::fp_index, s.cir->first_path_idx);
     out.set(Feature::kurtosis, s.cir->kurtosis);
     out.set(Feature::mean_excess_delay_ns, s.cir->mean_excess_delay_ns);
     out.set(Feature::rms_delay_spread_ns, s.cir->rms_delay_spread_ns);

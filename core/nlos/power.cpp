@@ -1,7 +1,5 @@
 #include "core/nlos/power.hpp"
 
-#include <cmath>
-
 namespace anchord::nlos {
 namespace {
 constexpr double k_two_17 = 131072.0;
@@ -29,18 +27,18 @@ double corrected_preamble_count(double rxpacc, double rxpacc_nosat, Sfd sfd) {
 std::optional<double> first_path_dbm(double f1, double f2, double f3, double preamble_count, Prf prf) {
   const double energy = f1 * f1 + f2 * f2 + f3 * f3;
   if (!(energy > 0) || !(preamble_count > 0)) return std::nullopt;
-  return 10 * std::log10(energy / (preamble_count * preamble_count)) - power_constant_db(prf);
+  return decibels(energy / (preamble_count * preamble_count)) - power_constant_db(prf);
 }
 
 std::optional<double> received_dbm(double cir_power, double preamble_count, Prf prf) {
   if (!(cir_power > 0) || !(preamble_count > 0)) return std::nullopt;
-  return 10 * std::log10(cir_power * k_two_17 / (preamble_count * preamble_count)) - power_constant_db(prf);
+  return decibels(cir_power * k_two_17 / (preamble_count * preamble_count)) - power_constant_db(prf);
 }
 
 std::optional<double> power_difference_db(double cir_power, double f1, double f2, double f3) {
   const double energy = f1 * f1 + f2 * f2 + f3 * f3;
   if (!(energy > 0) || !(cir_power > 0)) return std::nullopt;
-  return 10 * std::log10(cir_power * k_two_17 / energy);
+  return decibels(cir_power * k_two_17 / energy);
 }
 
 double straightened_dbm(double level_dbm, Prf prf) {

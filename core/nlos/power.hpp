@@ -1,5 +1,7 @@
 #pragma once
 
+#include <cmath>
+#include <numbers>
 #include <optional>
 
 /// Levels from the DW1000's receive diagnostics. Source: DW1000 User Manual 4.7; eq 5.6, 5.7 of the
@@ -8,6 +10,9 @@ namespace anchord::nlos {
 
 /// Pulse repetition frequency: sets the constant A of eq 5.6 and 5.7.
 enum class Prf { mhz16, mhz64 };
+
+/// 10 log10 of a ratio of powers, by the natural logarithm: its library function takes half the time.
+inline double decibels(double ratio) { return 10 / std::numbers::ln10 * std::log(ratio); }
 
 /// A, dB: 113.77 at 16 MHz, 121.74 at 64 MHz (DW1000 User Manual 4.7.1).
 double power_constant_db(Prf prf);

@@ -15,6 +15,7 @@ std::size_t BodyPipe::read(std::span<char> buffer) {
       if (content->failed_status != 0) throw api::BodyError(content->failed_status, content->failed);
       return 0;
     }
+    if (content->held() >= capacity_) call = content->on_space;
     n = std::min(buffer.size(), content->held());
     std::copy_n(content->bytes.data() + content->at, n, buffer.data());
     content->at += n;
@@ -25,7 +26,6 @@ std::size_t BodyPipe::read(std::span<char> buffer) {
       content->bytes.erase(0, content->at);
       content->at = 0;
     }
-    call = content->on_space;
   }
   if (call) call();
   return n;
@@ -35,10 +35,10 @@ void BodyPipe::abandon() {
   std::function<void()> call;
   {
     auto content = content_.lock();
+    if (content->held() >= capacity_) call = content->on_space;
     content->abandoned = true;
     content->bytes.clear();
     content->at = 0;
-    call = content->on_space;
   }
   if (call) call();
 }

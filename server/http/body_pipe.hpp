@@ -29,7 +29,8 @@ class BodyPipe final : public api::BodyReader {
   bool abandoned() const;
   void finish();
   void fail(int status, std::string why);
-  /// Called from the handler's thread when space appears after none was left, and at abandon().
+  /// Called from the handler's thread when space appears after none was left: only then does the io thread
+  /// wait for it, and each call wakes it.
   void on_space(std::function<void()> call);
 
  private:

@@ -1,4 +1,5 @@
 #include <array>
+#include <memory>
 #include <optional>
 #include <string>
 #include <utility>
@@ -215,7 +216,7 @@ class HttpSession final : public Connection, public std::enable_shared_from_this
     request_->body_stream = pipe.get();
     wire_.expect_body();
     RateFloor floor(SteadyClock::now(), limits_.body_window, limits_.body_floor_bytes_per_s);
-    std::string piece(k_piece_bytes, '\0');
+    const auto piece = std::make_unique_for_overwrite<char[]>(k_piece_bytes);
     std::shared_ptr<Job> job;
     BodyEnd end = BodyEnd::complete;
     std::uint64_t total = 0;
@@ -230,7 +231,7 @@ class HttpSession final : public Connection, public std::enable_shared_from_this
         continue;
       }
       const auto got =
-          co_await wire_.next_piece(parser, floor, {piece.data(), std::min(space, piece.size())});
+          co_await wire_.next_piece(parser, floor, {piece.get(), std::min(space, k_piece_bytes)});
       if (!got.more()) {
         end = ended(got);
         if (end == BodyEnd::lost) {
@@ -249,7 +250,7 @@ class HttpSession final : public Connection, public std::enable_shared_from_this
         end = BodyEnd::refused;
         break;
       }
-      pipe->feed({piece.data(), got.produced});
+      pipe->feed({piece.get(), got.produced});
     }
     if (parser.done()) pipe->finish();
     if (end == BodyEnd::complete && !job && parser.done())

@@ -74,6 +74,12 @@ TEST(JointLines, AreThoseOfEachRowByItself) {
         EXPECT_NEAR(of(JointLines::left), line.by_shared[k_shared_left], 1e-13);
         EXPECT_NEAR(of(JointLines::residual), line.residual_m, 1e-13);
         EXPECT_NEAR(of(JointLines::variance), line.position_variance_m2, 1e-16);
+        const JointLine whole = lines.line(n);
+        EXPECT_LT((whole.antenna_m - line.antenna_m).norm(), 1e-13);
+        EXPECT_LT((whole.by_anchor - line.by_anchor).norm(), 1e-13);
+        EXPECT_LT((whole.by_shared - line.by_shared).norm(), 1e-12);
+        EXPECT_EQ(whole.residual_m, of(JointLines::residual));
+        EXPECT_EQ(whole.position_variance_m2, of(JointLines::variance));
         ++n;
       }
       EXPECT_EQ(lines.size(), n);
@@ -103,6 +109,29 @@ TEST(JointLines, WeighAsTheLossDoes) {
   }
   EXPECT_GT(n_rejected, 10U);
   EXPECT_LT(n_rejected, lines.size() - 10);
+}
+
+TEST(JointLines, MultiplyAsManyColumnsAsThereAre) {
+  for (const std::size_t n : {1U, 9U, 10U, 11U, 14U, 21U}) {
+    std::vector<std::vector<double>> columns(n, std::vector<double>(52));
+    std::vector<double> weights(52);
+    std::vector<const double*> begins;
+    for (std::size_t i = 0; i < n; ++i) {
+      for (std::size_t k = 0; k < 52; ++k) {
+        const double at = static_cast<double>(7 * i + 3 * k);
+        columns[i][k] = std::sin(at), weights[k] = k < 50 ? 1.0 + 0.01 * static_cast<double>(k) : 0.0;
+      }
+      begins.push_back(columns[i].data());
+    }
+    const auto products = weighted_products(begins, weights);
+    ASSERT_EQ(products.size(), n * n);
+    for (std::size_t i = 0; i < n; ++i)
+      for (std::size_t j = 0; j < n; ++j) {
+        double expected = 0;
+        for (std::size_t k = 0; k < 52; ++k) expected += weights[k] * columns[i][k] * columns[j][k];
+        EXPECT_NEAR(products[i * n + j], expected, 1e-12) << n;
+      }
+  }
 }
 
 TEST(JointLines, SumToTheNormalEquationsOfTheirDerivatives) {

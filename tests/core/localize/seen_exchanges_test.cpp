@@ -53,5 +53,21 @@ TEST(SeenExchanges, RememberTheNewestAndForgetTheFirst) {
   EXPECT_EQ(seen.size(), 100u);
 }
 
+// Of a clock that counts 100 us, as an upload has them: each once, then the newest again, then one too old.
+TEST(SeenExchanges, RememberAsManyAsTheyMayOfALongUpload) {
+  constexpr std::int64_t most = 80'000, all = 200'000;
+  SeenExchanges seen(most);
+  const auto at = [](std::int64_t i) {
+    return exchange(1'777'889'472'000'000'000 + i * 100'000, 0x6e01, 0,
+                    0x6a20 + static_cast<std::uint32_t>(i % 6));
+  };
+  for (std::int64_t i = 0; i < all; ++i) ASSERT_TRUE(seen.insert(at(i))) << i;
+  for (std::int64_t i = all - most; i < all; ++i) ASSERT_FALSE(seen.insert(at(i))) << i;
+  EXPECT_EQ(seen.size(), static_cast<std::size_t>(most));
+  EXPECT_TRUE(seen.insert(at(all - most - 1)));
+  EXPECT_TRUE(seen.insert(at(all - most))) << "the oldest made room for the one before";
+  EXPECT_FALSE(seen.insert(at(all - 1)));
+}
+
 }  // namespace
 }  // namespace anchord

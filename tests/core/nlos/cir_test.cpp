@@ -188,6 +188,31 @@ TEST(CirShape, OfRandomRecordsMatchesThePrintedFormulasTakenOneTapAtATime) {
   }
 }
 
+// Every other noise tap at the limit of its numbers and all from the path on: powers 2^31, of noise 2^30 in
+// the mean. Of the 50 equal taps of a window from -5 on the mean is 19.5. Once the window ends with the
+// record.
+TEST(CirShape, OfTheStrongestTapsAddsUpExactly) {
+  for (const std::size_t path : {746U, 971U}) {
+    std::vector<std::int16_t> re_im(2 * 1016, -32768);
+    for (std::size_t k = 0; k < path - 5; k += 2) re_im[2 * k] = re_im[2 * k + 1] = 0;
+    CirOptions o;
+    o.tap_ns = 1;
+    o.keep_rms = 1;
+    for (const bool wide : {true, false}) {
+      o.wide_registers = wide;
+      const auto shape = cir_shape(re_im, static_cast<double>(path), o);
+      ASSERT_TRUE(shape);
+      EXPECT_EQ(shape->noise_rms, 32768.0);
+      EXPECT_EQ(shape->energy, static_cast<double>(1016 - (path - 5)) * 1073741824.0);
+      EXPECT_NEAR(shape->mean_excess_delay_ns, 19.5, 1e-12);
+      EXPECT_NEAR(shape->rms_delay_spread_ns, std::sqrt((50.0 * 50.0 - 1) / 12), 1e-12);
+      EXPECT_EQ(shape->early_energy, 13.0 / 50.0);
+      EXPECT_EQ(shape->peak_delay_ns, -5.0);
+      EXPECT_EQ(shape->first_path_energy, 3 * 2147483648.0);
+    }
+  }
+}
+
 TEST(CirShape, IsTheSameForComplexTapsAndTheirMagnitude) {
   std::vector<std::int16_t> re_im;
   std::vector<float> magnitude;

@@ -41,6 +41,21 @@ TEST(Features, LeaveOutWhatIsImpossible) {
   EXPECT_TRUE(compute_features(s).present.none());
 }
 
+// Without a count of symbols nothing is known against them, and the registers still give their difference.
+TEST(Features, WithoutAPreambleCountAreThoseOfTheRegistersAlone) {
+  DiagnosticSample s;
+  s.cir_power = 9143;
+  s.fp_amp1 = 9120, s.fp_amp2 = 11840, s.fp_amp3 = 8603;
+  s.std_noise = 40;
+  const auto f = compute_features(s);
+  EXPECT_NEAR(*f.get(Feature::rx_minus_fp_db), 6.0530, 1e-4);
+  EXPECT_NEAR(*f.get(Feature::total_snr_db), 58.7448, 1e-4);  // 10 log10(9143 2^17) - 20 log10 40
+  EXPECT_NEAR(*f.get(Feature::fp_snr_db), 49.4258, 1e-4);     // 20 log10(11840 / 40)
+  for (const auto feature :
+       {Feature::rx_dbm, Feature::fp_dbm, Feature::preamble_db, Feature::noise_excess_db})
+    EXPECT_FALSE(f.get(feature)) << feature_name(feature);
+}
+
 TEST(Features, HaveOneNameEachThatFindsThemAgain) {
   for (std::size_t i = 0; i < k_feature_count; ++i) {
     const auto f = static_cast<Feature>(i);
