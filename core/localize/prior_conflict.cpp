@@ -40,7 +40,8 @@ std::string prior_conflict(const AnchorPriors& priors, const Eigen::Vector3d& pl
     const double sigmas = std::abs(h->up_m - place_m.z()) / h->sigma_m;
     if (sigmas > k_contradicted)
       add(text,
-          "the height %.2f m above the origin (of a height search, or given) disagrees with the ranges, %.2f m "
+          "the height %.2f m above the origin (of a height search, or given) disagrees with the ranges, %.2f "
+          "m "
           "(%.1f sigma): the ranges are used; the peak may be a reflection",
           h->up_m, place_m.z(), sigmas);
   }

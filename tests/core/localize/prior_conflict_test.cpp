@@ -19,10 +19,13 @@ TEST(PriorConflict, NamesBothValuesBeyondThreeSigmasAlone) {
   priors.bearing = {{0, 0, 5}, std::numbers::pi / 2, 0.35};  // east
   EXPECT_EQ(prior_conflict(priors, {10, 1, 6.6}, Dims::three), "") << "2.8 sigmas, and 0.3";
   const std::string up = prior_conflict(priors, {10, 1, 6.0}, Dims::three);
-  EXPECT_TRUE(says(up, "the height 8.00 m above the origin") && says(up, "disagrees with the ranges, 6.00 m (4.0 sigma)")) << up;
+  EXPECT_TRUE(says(up, "the height 8.00 m above the origin") &&
+              says(up, "disagrees with the ranges, 6.00 m (4.0 sigma)"))
+      << up;
   EXPECT_FALSE(says(up, "bearing"));
   const std::string aside = prior_conflict(priors, {-10, 0.1, 8}, Dims::three);
-  EXPECT_TRUE(says(aside, "the bearing 90 degrees") && says(aside, "disagrees with the ranges, 271 degrees")) << aside;
+  EXPECT_TRUE(says(aside, "the bearing 90 degrees") && says(aside, "disagrees with the ranges, 271 degrees"))
+      << aside;
   EXPECT_EQ(prior_conflict(priors, {10, 1, 0.0}, Dims::two), "") << "its height is held";
   EXPECT_EQ(prior_conflict(priors, {-0.1, 0, 8}, Dims::three), "") << "right above where it turned";
   EXPECT_EQ(prior_conflict({}, {10, 1, 0.0}, Dims::three), "");
