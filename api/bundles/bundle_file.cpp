@@ -1,5 +1,6 @@
 #include "api/bundles/bundle_file.hpp"
 
+#include <algorithm>
 #include <cerrno>
 
 #include "api/bundles/spool.hpp"
@@ -35,6 +36,10 @@ Result<void> FolderSink::row(const BundleRow& row) {
 
 Result<void> FolderSink::end() {
   if (table_ == nullptr) return boost::outcome_v2::success();
+  if (table_->later && entry_.rows == 0) {
+    table_ = nullptr;
+    return boost::outcome_v2::success();
+  }
   if (!width_) begin_text(nullptr);
   BOOST_OUTCOME_TRY(flush());
   file_.close();
@@ -81,8 +86,10 @@ Result<std::filesystem::path> make_bundle(BundleApi& api, const Mission& mission
   const auto file = folder.path("bundle.anchord");
   BOOST_OUTCOME_TRY(auto zip, ZipWriter::create(file));
   BOOST_OUTCOME_TRY(zip.add_text(std::string(k_bundle_manifest), write_bundle_manifest(manifest)));
-  for (std::size_t i = 0; i < n_tables; ++i) {
-    BOOST_OUTCOME_TRY(zip.add_file(manifest.entries[i].name, folder.path(api.bundles.tables()[i].name)));
+  for (const auto& table : api.bundles.tables()) {
+    const auto name = bundle_entry_name(table);
+    if (std::ranges::find(manifest.entries, name, &BundleEntry::name) == manifest.entries.end()) continue;
+    BOOST_OUTCOME_TRY(zip.add_file(name, folder.path(table.name)));
   }
   for (std::size_t i = 0; i < notes.size(); ++i) {
     BOOST_OUTCOME_TRY(zip.add_text(manifest.entries[n_tables + i].name, std::move(notes[i].text)));
@@ -113,6 +120,8 @@ Result<BundleEntry> entry_of(const std::string& name, const std::filesystem::pat
 
 Result<void> BundleZipSource::open(const BundleTable& table) {
   table_ = &table;
+  lines_.reset();
+  if (table.later && !zip_.has(bundle_entry_name(table))) return boost::outcome_v2::success();
   BOOST_OUTCOME_TRY(auto lines, ZipLines::open(zip_, bundle_entry_name(table)));
   lines_ = std::move(lines);
   std::string_view line;
@@ -122,6 +131,7 @@ Result<void> BundleZipSource::open(const BundleTable& table) {
 }
 
 Result<bool> BundleZipSource::next(BundleRow& row) {
+  if (!lines_) return false;
   std::string_view line;
   BOOST_OUTCOME_TRY(const bool more, lines_->next(line));
   if (!more) return false;

@@ -13,12 +13,12 @@ namespace {
 
 using Ordered = nlohmann::ordered_json;
 
-/// Every table once, and beside them notes alone.
+/// Every table once, those that came later at most once, and beside them notes alone.
 Result<void> check_tables(const BundleStore& store, const BundleManifest& manifest) {
   std::string wrong;
   for (const auto& table : store.tables()) {
-    if (std::ranges::find(manifest.entries, bundle_entry_name(table), &BundleEntry::name) ==
-        manifest.entries.end())
+    if (!table.later && std::ranges::find(manifest.entries, bundle_entry_name(table), &BundleEntry::name) ==
+                            manifest.entries.end())
       wrong += (wrong.empty() ? "" : ", ") + bundle_entry_name(table) + " is missing";
   }
   for (const auto& entry : manifest.entries) {

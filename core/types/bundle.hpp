@@ -33,6 +33,9 @@ using BundleRow = std::vector<BundleCell>;
 struct BundleTable {
   std::string name;
   std::vector<BundleColumn> columns;
+  /// Came when there were bundles already: there only where it has rows, so that what has none is the bundle
+  /// that it was.
+  bool later{false};
 };
 
 }  // namespace anchord
