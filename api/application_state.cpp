@@ -61,6 +61,7 @@ Application::State::State(Deps d)
       structures(stores.places),
       flights({.missions = missions,
                .plans = seen.plans,
+               .procedure_log = stores.procedure_log,
                .structures = structures,
                .hub = hub,
                .events = events,
@@ -159,7 +160,7 @@ Application::State::State(Deps d)
                    [this](const PlanId& id) { return flights.flown_with(id); },
                    [this](const Plan& plan) { flights.plan_saved(plan); },
                    structures},
-      flight_api{flights, mission_api, events, audit},
+      flight_api{flights, mission_api, stores.procedure_log, events, audit},
       publisher({hub, stores.missions, stores.sites, stores.revisions,
                  [this] {
                    std::uint64_t newest = 0;

@@ -33,9 +33,13 @@ Result<FlightService::FlownPlan> FlightService::flown_plan(const MissionId& miss
   const auto* f = w->operations.flight_of(mission);
   if (f == nullptr)
     return make_error(Errc::not_found, "this mission has not been flown since the server started");
-  const auto& c = f->changes;
-  return FlownPlan{
-      f->plan, c.n, c.at, c.by, c.saved_revision, c.former ? std::optional(c.former->version) : std::nullopt};
+  return State::flown_by(*f);
+}
+
+FlightService::FlownPlan FlightService::State::flown_by(const flight::ActiveFlight& f) {
+  const auto& c = f.changes;
+  return {
+      f.plan, c.n, c.at, c.by, c.saved_revision, c.former ? std::optional(c.former->version) : std::nullopt};
 }
 
 /// The plan that is asked for, by the walls of today; the store is asked without the lock.

@@ -1,4 +1,5 @@
 #include <array>
+#include <charconv>
 #include <nlohmann/json.hpp>
 
 #include "api/admin/event_log.hpp"
@@ -10,6 +11,7 @@
 #include "api/kit/support.hpp"
 #include "api/missions/mission_service.hpp"
 #include "core/ports/plan_store.hpp"
+#include "core/ports/procedure_log.hpp"
 
 namespace anchord::api {
 
@@ -257,6 +259,37 @@ Response change_aircraft(FlightApi& s, const Request& request) {
   return json_response(200, drone_json(status));
 }
 
+/// A cursor is the number of the last entry before.
+std::uint64_t entry_number(const std::string& cursor) {
+  std::uint64_t number = 0;
+  if (cursor.empty()) return number;
+  const auto [end, fault] = std::from_chars(cursor.data(), cursor.data() + cursor.size(), number);
+  if (fault != std::errc{} || end != cursor.data() + cursor.size())
+    throw_problem(422, "validation", "cursor was not issued by this server",
+                  {{"/cursor", "bad_cursor", "was not issued by this server"}});
+  return number;
+}
+
+/// Oldest first.
+Response procedure_log(FlightApi& s, const Request& request) {
+  check_query(request, {"limit", "cursor"});
+  const auto mission = named_mission(s.missions, request).id;
+  const auto page = page_query(request);
+  const auto after = entry_number(page.cursor);
+  auto entries = value_or_problem(s.procedure_log.entries(mission, page.limit + 1, after));
+  std::size_t bytes = 0;
+  for (const auto& one : entries) bytes += one.entry.message_json.size();
+  const bool full = entries.size() > page.limit;
+  if (full) entries.pop_back();
+  Ordered items = Ordered::array();
+  for (const auto& [number, entry] : entries)
+    items.push_back({{"t_us", entry.time.us()},
+                     {"topic", entry.topic},
+                     {"data", Ordered::parse(entry.message_json, nullptr, false)}});
+  const bool more = full || bytes >= ProcedureLog::k_page_bytes;
+  return list_response(request, std::move(items), more ? std::to_string(entries.back().number) : "");
+}
+
 }  // namespace
 
 void refuse_elsewhere(FlightApi& s, bool taking) {
@@ -295,6 +328,7 @@ void add_flight_routes(Router& router, FlightApi& s) {
               [&s](const Request& request) { return shown(s, request, &FlightService::procedure_text); }});
   router.add({Method::get, base + "grid", readers(),
               [&s](const Request& request) { return shown(s, request, &FlightService::grid_text); }});
+  router.add(as_heavy({Method::get, base + "procedure-log", readers(), on(procedure_log)}));
   router.add({Method::get, base + "turns", readers(),
               [&s](const Request& request) { return profiles(s, request, &FlightService::turn_texts); }});
   router.add({Method::get, base + "height-searches", readers(),

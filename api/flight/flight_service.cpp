@@ -153,7 +153,7 @@ void FlightService::step() {
     due = State::due(*w, now);
   }
   s.publish_events();
-  if (due.procedure) s.publish(*due.procedure);
+  s.publish(due);
   bool due_apart = false;
   {
     auto w = s.work.lock();

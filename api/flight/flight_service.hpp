@@ -25,6 +25,7 @@ namespace anchord {
 class Drone;
 class Executor;
 class PlanStore;
+class ProcedureLog;
 }  // namespace anchord
 
 namespace anchord::api {
@@ -50,6 +51,7 @@ class FlightService final : public MissionObserver, public MissionControl {
   struct Deps {
     MissionService& missions;
     PlanStore& plans;
+    ProcedureLog& procedure_log;
     SiteStructures& structures;
     Hub& hub;
     EventLog& events;

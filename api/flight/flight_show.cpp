@@ -4,15 +4,26 @@
 #include <nlohmann/json.hpp>
 
 #include "api/flight/flight_state.hpp"
+#include "api/flight/plan_change_json.hpp"
 #include "api/flight/procedure_json.hpp"
+#include "api/kit/late_writer.hpp"
 #include "api/stream/hub.hpp"
 #include "core/base/to_wire.hpp"
+#include "core/ports/procedure_log.hpp"
 
 namespace anchord::api {
 namespace {
 
 constexpr std::ptrdiff_t k_shown_commands = 30;
 constexpr double k_profiles_s = 0.5;
+constexpr double k_logged_profiles_s = 5;  // a turn takes a minute
+
+/// What grows in a step.
+std::optional<Topic> growing_in(procedure::Step step) {
+  if (step == procedure::Step::turn) return Topic::mission_turn;
+  if (step == procedure::Step::height_search) return Topic::mission_height;
+  return std::nullopt;
+}
 
 GridView grid_of(const flight::ActiveFlight& f, std::int64_t t_us) {
   const auto& engine = f.control.engine();
@@ -102,9 +113,9 @@ FlightService::State::Due FlightService::State::due(Work& w, const flight::Now& 
     out.procedure = procedure(at, w.operations, f);
     w.last.shown_s = at.s;
   }
-  const auto step = engine.state().step;
-  const bool growing = step == procedure::Step::turn || step == procedure::Step::height_search;
-  if (moved || (growing && at.s - w.last.profiles_s >= k_profiles_s)) {
+  out.logged = moved || soon;
+  if (out.logged && std::exchange(w.last.logged_changes, f.changes.n) != f.changes.n) out.plan = flown_by(f);
+  if (moved || (growing_in(engine.state().step) && at.s - w.last.profiles_s >= k_profiles_s)) {
     out.profiles = true;
     w.last.profiles_s = at.s;
   }
@@ -113,30 +124,64 @@ FlightService::State::Due FlightService::State::due(Work& w, const flight::Now& 
   return out;
 }
 
-void FlightService::State::publish(const ProcedureView& view) const {
-  deps.hub.publish(Topic::procedure, to_wire(procedure_json(view)), view.t_us, to_string(view.mission), {},
-                   view.mission);
+void FlightService::State::log(const MissionId& mission, std::int64_t t_us, std::string_view topic,
+                               std::vector<std::string> messages) const {
+  std::vector<ProcedureEntry> entries;
+  for (auto& text : messages)
+    entries.push_back({UtcTime::from_us(t_us), std::string(topic), std::move(text)});
+  if (entries.empty()) return;
+  deps.late.write([&to = deps.procedure_log, mission,
+                   entries = std::move(entries)] { return to.append(mission, entries); },
+                  std::chrono::milliseconds{0});
+}
+
+void FlightService::State::publish(const Due& due) const {
+  if (!due.procedure) return;
+  const auto& view = *due.procedure;
+  const auto text = to_wire(procedure_json(view));
+  deps.hub.publish(Topic::procedure, text, view.t_us, to_string(view.mission), {}, view.mission);
+  if (due.plan) log(view.mission, view.t_us, k_log_plan, {to_wire(flown_plan_json(view.mission, *due.plan))});
+  if (due.logged) log(view.mission, view.t_us, info(Topic::procedure).name, {text});
 }
 
 void FlightService::State::show_grid(Guard& w) const {
   const auto grid = grid_of(*w->operations.flight(), now().utc.us());
+  const auto decided_s = grid.decision ? std::optional(grid.decision->time_s) : std::nullopt;
+  const bool logged = decided_s && std::exchange(w->last.logged_decision_s, *decided_s) != *decided_s;
   w.unlocked([&] {
-    deps.hub.publish(Topic::mission_grid, to_wire(grid_json(grid)), grid.t_us, to_string(grid.mission), {},
-                     grid.mission);
+    const auto text = to_wire(grid_json(grid));
+    deps.hub.publish(Topic::mission_grid, text, grid.t_us, to_string(grid.mission), {}, grid.mission);
+    if (logged) log(grid.mission, grid.t_us, info(Topic::mission_grid).name, {text});
   });
 }
 
+/// What has grown and is worth an entry: now and then, and as it ended.
+std::optional<Topic> FlightService::State::take_grown(Last& last, procedure::Step step, double now_s) {
+  const auto growing = growing_in(step);
+  const auto before = std::exchange(last.growing, growing);
+  if (before && before != growing) return before;
+  if (!growing || now_s - last.logged_profiles_s < k_logged_profiles_s) return std::nullopt;
+  last.logged_profiles_s = now_s;
+  return growing;
+}
+
 void FlightService::State::show_profiles(Guard& w) const {
-  const auto profiles = profiles_of(*w->operations.flight(), now().utc.us());
+  const auto at = now();
+  const auto profiles = profiles_of(*w->operations.flight(), at.utc.us());
+  const auto grown = take_grown(w->last, profiles.step, at.s);
   const auto key = to_string(profiles.mission);
+  std::vector<std::string> to_log;
   const auto to = [&](Topic topic) {
     return [&, topic](NetworkId anchor, const nlohmann::ordered_json& one) {
-      deps.hub.publish(topic, to_wire(one), profiles.t_us, key + to_string(anchor), anchor, profiles.mission);
+      auto text = to_wire(one);
+      deps.hub.publish(topic, text, profiles.t_us, key + to_string(anchor), anchor, profiles.mission);
+      if (topic == grown) to_log.push_back(std::move(text));
     };
   };
   w.unlocked([&] {
     profiles.turns(to(Topic::mission_turn));
     profiles.heights(to(Topic::mission_height));
+    if (grown) log(profiles.mission, profiles.t_us, info(*grown).name, std::move(to_log));
   });
 }
 

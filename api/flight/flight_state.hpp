@@ -12,6 +12,7 @@
 #include "api/kit/storage_status.hpp"
 #include "api/missions/mission_service.hpp"
 #include "api/planning/plan_json.hpp"
+#include "api/stream/hub.hpp"
 #include "core/base/guard.hpp"
 #include "core/base/locked.hpp"
 #include "core/flight/hand_over.hpp"
@@ -39,6 +40,9 @@ struct FlightService::State {
   struct Last {
     std::uint64_t flight{0}, kept{~0ULL}, shown{~0ULL};
     double shown_s{-10}, profiles_s{-10};
+    double logged_decision_s{-10}, logged_profiles_s{-10};
+    std::uint64_t logged_changes{~0ULL};  ///< of the plan
+    std::optional<Topic> growing{};       ///< of the profiles that grew when they were last shown
     bool flew{false};
   };
   /// What rounds, requests and measurements share. No disk, no estimate, no JSON, no message and nothing long
@@ -84,16 +88,23 @@ struct FlightService::State {
   template <class Part>
   Part outcome(const MissionId& mission, Part KeptOutcome::*part);
   void keep(const MissionId& mission, const ToKeep& what) const;
+  static FlownPlan flown_by(const flight::ActiveFlight& f);
   static ProcedureView procedure(const flight::Now& at, const flight::Operations& operations,
                                  const flight::ActiveFlight& f);
   /// What is to be shown after a round.
   struct Due {
     std::optional<ProcedureView> procedure{};
+    bool logged{false};                 ///< the procedure, for a replay too
+    std::optional<FlownPlan> plan{};    ///< for a replay, as it began or was changed
     bool grid{false}, profiles{false};  ///< apart, once the procedure was
   };
   static Due due(Work& w, const flight::Now& at);
-  void publish(const ProcedureView& view) const;
+  void publish(const Due& due) const;
+  /// For a replay, whenever the disk has time for it.
+  void log(const MissionId& mission, std::int64_t t_us, std::string_view topic,
+           std::vector<std::string> messages) const;
   void show_grid(Guard& w) const;
+  static std::optional<Topic> take_grown(Last& last, procedure::Step step, double now_s);
   void show_profiles(Guard& w) const;
 
   Deps deps;

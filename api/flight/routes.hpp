@@ -12,6 +12,7 @@ class FlightService;
 struct FlightApi {
   FlightService& flights;
   MissionApi& missions;
+  ProcedureLog& procedure_log;
   EventLog& events;
   Audit audit;
 };

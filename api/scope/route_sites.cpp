@@ -42,6 +42,7 @@ constexpr auto k_routes = std::to_array<RouteSites>({
     {post, "/api/v1/missions/{id}/checklist/{item}", mission},
     {get, "/api/v1/missions/{id}/procedure", mission},
     {get, "/api/v1/missions/{id}/grid", mission},
+    {get, "/api/v1/missions/{id}/procedure-log", mission},
     {get, "/api/v1/missions/{id}/turns", mission},
     {get, "/api/v1/missions/{id}/height-searches", mission},
     {get, "/api/v1/missions/{id}/events", mission},

@@ -33,10 +33,12 @@ struct ScopedStores::State {
         calibrations(scoped_calibrations(all.calibrations, *missions)),
         revisions(scoped_revisions(all.revisions, *anchors)),
         bundles(scoped_bundles(all, *missions, *calibrations, *places)),
-        stores{*measurements, *missions,     *bin,         all.exclusions,    all.events, *sites,
-               *anchors,      *calibrations, *revisions,   all.kits,          *frames,    *plans,
-               all.campaigns, all.labels,    all.datasets, all.training_runs, all.models, all.jobs,
-               all.tokens,    all.access,    all.service,  all.webhooks,      *places,    *bundles} {}
+        stores{
+            *measurements, *missions,     *bin,          all.exclusions, all.events,        all.procedure_log,
+            *sites,        *anchors,      *calibrations, *revisions,     all.kits,          *frames,
+            *plans,        all.campaigns, all.labels,    all.datasets,   all.training_runs, all.models,
+            all.jobs,      all.tokens,    all.access,    all.service,    all.webhooks,      *places,
+            *bundles} {}
 
   const std::unique_ptr<SiteStore> sites;
   const std::unique_ptr<PlanStore> plans;

@@ -20,6 +20,7 @@ class MissionStore;
 class ModelStore;
 class PlaceStore;
 class PlanStore;
+class ProcedureLog;
 class RevisionStore;
 class ServiceStore;
 class SiteStore;
@@ -34,6 +35,7 @@ struct Stores {
   MissionBin& bin;
   ExclusionStore& exclusions;
   EventStore& events;
+  ProcedureLog& procedure_log;
   SiteStore& sites;
   AnchorStore& anchors;
   CalibrationStore& calibrations;

@@ -122,8 +122,8 @@ void FlightEngine::decided(std::uint64_t number, Result<planning::Decision> deci
 void FlightEngine::conclude(double now_s, Result<planning::Decision> decided) {
   if (!decided) return finish(now_s, Trigger::no_point, decided.error().message);
   const double before = decided.value().value_before;
-  if (decision_ && decision_->predicted && std::isfinite(before)) decision_->reached = before;
   DecisionRecord record;
+  if (decision_ && decision_->predicted && std::isfinite(before)) record.reached = before;
   record.time_s = now_s;
   record.decision = std::move(decided).value();
   const auto chosen = record.decision.chosen;

@@ -69,7 +69,7 @@ struct DecisionRecord {
   double time_s{};
   planning::Decision decision;
   std::optional<double> predicted{};  ///< value of the chosen point
-  std::optional<double> reached{};    ///< value when the next decision was made
+  std::optional<double> reached{};    ///< value that the point of the decision before gave
   std::string outcome;                ///< point, no_point or done_here, with its reason
 };
 

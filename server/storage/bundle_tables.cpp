@@ -64,6 +64,8 @@ constexpr std::array k_lines{
          "ordinal", k_of_flight, "t.ordinal"},
     Line{BundlePart::own, "mission_procedure", "mission t state_json i changed_t_ns", "", k_of_flight,
          "t.mission_key"},
+    Line{BundlePart::own, "procedure_log+", "mission i number i t_ns t topic t message_json", "number",
+         k_of_flight, "t.number"},
     Line{BundlePart::measured, "uwb_range",
          "mission i kind i t_ns i received_t_ns i tag i antenna i anchor i seq r distance_m r rss_dbm "
          "r fp_dbm r rx_dbm r std_noise r heading_deg r truth_distance_m i truth_los c dt_ps "

@@ -10,6 +10,7 @@ SqlStores::SqlStores(Gate& gate, AdmitMission admit, const CirFolder& files)
       bin(make_mission_bin(gate, files)),
       exclusions(make_exclusion_store(gate)),
       events(make_event_store(gate)),
+      procedure_log(make_procedure_log(gate)),
       sites(make_site_store(gate)),
       anchors(make_anchor_store(gate)),
       calibrations(make_calibration_store(gate)),
@@ -30,8 +31,9 @@ SqlStores::SqlStores(Gate& gate, AdmitMission admit, const CirFolder& files)
       places(make_place_store(gate)),
       bundles(make_bundle_store(gate, files)),
       cir_archive(make_cir_archive(gate, files, *measurements)),
-      ports{*measurements, *missions, *bin,    *exclusions, *events,    *sites,    *anchors,  *calibrations,
-            *revisions,    *kits,     *frames, *plans,      *campaigns, *labels,   *datasets, *training_runs,
-            *models,       *jobs,     *tokens, *access,     *service,   *webhooks, *places,   *bundles} {}
+      ports{*measurements, *missions,     *bin,           *exclusions, *events, *procedure_log, *sites,
+            *anchors,      *calibrations, *revisions,     *kits,       *frames, *plans,         *campaigns,
+            *labels,       *datasets,     *training_runs, *models,     *jobs,   *tokens,        *access,
+            *service,      *webhooks,     *places,        *bundles} {}
 
 }  // namespace anchord::sql

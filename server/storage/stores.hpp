@@ -19,6 +19,7 @@
 #include "core/ports/mission_store.hpp"
 #include "core/ports/place_store.hpp"
 #include "core/ports/plan_store.hpp"
+#include "core/ports/procedure_log.hpp"
 #include "core/ports/revision_store.hpp"
 #include "core/ports/site_store.hpp"
 #include "core/ports/stores.hpp"
@@ -54,6 +55,7 @@ std::unique_ptr<MissionBin> make_mission_bin(Gate& gate, const CirFolder& files 
 std::unique_ptr<ServiceStore> make_service_store(Gate& gate);
 std::unique_ptr<ExclusionStore> make_exclusion_store(Gate& gate);
 std::unique_ptr<EventStore> make_event_store(Gate& gate);
+std::unique_ptr<ProcedureLog> make_procedure_log(Gate& gate);
 std::unique_ptr<WebhookStore> make_webhook_store(Gate& gate);
 std::unique_ptr<PlaceStore> make_place_store(Gate& gate);
 std::unique_ptr<BundleStore> make_bundle_store(Gate& gate, const CirFolder& files = {});
@@ -70,6 +72,7 @@ struct SqlStores {
   const std::unique_ptr<MissionBin> bin;
   const std::unique_ptr<ExclusionStore> exclusions;
   const std::unique_ptr<EventStore> events;
+  const std::unique_ptr<ProcedureLog> procedure_log;
   const std::unique_ptr<SiteStore> sites;
   const std::unique_ptr<AnchorStore> anchors;
   const std::unique_ptr<CalibrationStore> calibrations;

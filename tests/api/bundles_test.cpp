@@ -1,6 +1,7 @@
 // A flight leaves one server as a file and stands on another as it was: the same ids, rows and anchors; all
 // or nothing; whatever is not what the manifest says is refused. And the signed pack that is handed over.
 #include "bundles_fixture.hpp"
+#include "core/ports/procedure_log.hpp"
 
 namespace anchord::test {
 namespace {
@@ -90,6 +91,24 @@ TEST_F(Bundles, CarryTheLeverArmSigmaOfTheirMission) {
   // The name alone does not make a column.
   EXPECT_GE(third.take(forged("mission", ",0.03]", "]")).status, 400);
   expect_nothing(third);
+}
+
+TEST_F(Bundles, CarryWhatTheProcedureShowedAndHaveNoEntryOfItWhereItShowedNothing) {
+  const auto without = bundle();
+  EXPECT_EQ(without.find("procedure_log"), std::string::npos)
+      << "a server from before there was one takes it";
+  const ProcedureEntry entry{clock_.now(), "mission.grid", R"({"chosen":0})"};
+  ASSERT_TRUE(database_->stores().procedure_log.append(id_, std::vector{entry, entry}));
+  OtherServer other;
+  EXPECT_EQ(other.take(without).status, 201);
+  EXPECT_TRUE(other.stores().procedure_log.entries(id_, 10, 0).value().empty());
+  const auto taken = other.take(bundle());
+  ASSERT_EQ(taken.status, 201) << taken.body;
+  EXPECT_EQ(json(taken)["added"], Json({{"procedure_log", 2}}));
+  const auto there = other.stores().procedure_log.entries(id_, 10, 1).value();
+  ASSERT_EQ(there.size(), 1u);
+  EXPECT_EQ(there[0].entry.message_json, entry.message_json);
+  EXPECT_EQ(json(other.take(bundle()))["already"], true);
 }
 
 TEST_F(Bundles, BringLaterWordsOfTheFlightToo) {

@@ -90,6 +90,46 @@ TEST_F(Flights, StartsHoldsResumesAndLands) {
   EXPECT_EQ(act("return", lease).status, 422) << "nothing flies any more";
 }
 
+TEST_F(Flights, KeepWhatTheirProcedureShowedOfEveryStep) {
+  const auto lease = take_off();
+  ASSERT_TRUE(fly_until([&] { return procedure()["step"] == "search_anchors"; }, 60));
+  ASSERT_EQ(act("land", lease).status, 202);
+  ASSERT_TRUE(fly_until([&] { return procedure()["step"] == "done"; }, 60));
+  const auto last = procedure();
+  Json shown = Json::array();
+  const auto read = [&] {
+    shown = Json::array();
+    for (Json cursor = "0"; !cursor.is_null();) {
+      const Json page = json(get(base() + "/procedure-log", {{"limit", "2"}, {"cursor", cursor}}));
+      for (const auto& item : page["items"]) shown.push_back(item);
+      cursor = page["next_cursor"];
+    }
+    return !shown.empty() && shown.back()["data"]["step"] == "done";
+  };
+  ASSERT_TRUE(fly_until(read, 5)) << shown.dump(1);
+  std::set<std::string> steps;
+  std::int64_t t_us = 0;
+  EXPECT_EQ(shown[0]["topic"], "plan");
+  EXPECT_EQ(shown[0]["data"]["plan"]["waypoints"], json(get(base() + "/plan"))["plan"]["waypoints"]);
+  shown.erase(0);
+  for (const auto& item : shown) {
+    EXPECT_EQ(item["topic"], "procedure");
+    EXPECT_GE(item["t_us"], t_us) << "in the order of the flight";
+    EXPECT_EQ(item["data"]["mission"], mission_);
+    t_us = item["t_us"];
+    steps.insert(item["data"]["step"]);
+  }
+  const auto events = json(get(base() + "/events", {{"limit", "1000"}}))["items"];
+  for (const auto& event : events) {
+    const std::string code = event["code"];
+    if (!code.starts_with("procedure.")) continue;
+    EXPECT_TRUE(steps.contains(code.substr(10))) << code << ": " << event["text"];
+  }
+  EXPECT_GE(steps.size(), 4u);
+  EXPECT_EQ(shown.back()["data"]["ended"], last["ended"]);
+  EXPECT_EQ(get(base() + "/procedure-log", {{"cursor", "x"}}).status, 422);
+}
+
 class BusyFlights : public Flights {
  protected:
   /// The flight is in the air; whoever holds `live` from here on keeps its strand busy.

@@ -33,6 +33,7 @@
 #include "core/ml/recipe.hpp"
 #include "core/planning/local_plan.hpp"
 #include "core/planning/plan_change.hpp"
+#include "core/ports/procedure_log.hpp"
 #include "core/procedure/machine.hpp"
 #include "core/procedure/safety.hpp"
 #include "core/types/event_level.hpp"
@@ -189,6 +190,14 @@ Json topic_names() {
   return out;
 }
 
+/// What the procedure shows.
+Json procedure_topic_names() {
+  Json out{k_log_plan};
+  for (const auto topic : {Topic::procedure, Topic::mission_grid, Topic::mission_turn, Topic::mission_height})
+    out.push_back(info(topic).name);
+  return out;
+}
+
 template <class T, std::size_t N>
 Json words(const EnumTable<T, N>& table) {
   return std::vector<std::string>(table.words().begin(), table.words().end());
@@ -250,6 +259,7 @@ std::map<std::string, Json> tables_of_receivers() {
 TEST(WireWords, AreThoseOfOpenApi) {
   std::map<std::string, Json> tables{
       {"Exclusion.kind", words(k_row_kind_words)},
+      {"ProcedureLogEntry.topic", procedure_topic_names()},
       {"ExclusionRequest.kind", words(k_row_kind_words)},
       {"FixClass", words(k_fix_words)},
       {"GET /api/v1/ranges ?fix", words(k_fix_words)},

@@ -425,7 +425,7 @@ test('a flight by hand: control, checklist, start, hold, abort', async () => {
     await new Promise((resolve) => setTimeout(resolve, 100));
   }
   assert.equal(started.status, 202, started.text);
-  for (const shown of ['procedure', 'grid']) await call('GET', `${path}/${shown}`, { expect: 200 });
+  for (const shown of ['procedure', 'grid', 'procedure-log']) await call('GET', `${path}/${shown}`, { expect: 200 });
   await call('POST', `${path}/actions`, { expect: 409, json: { action: 'hold', lease: 'not mine' } });
   await call('POST', `${path}/actions`, {
     expect: 202,

@@ -26,6 +26,12 @@ async function opened(options = {}) {
   await eventually('the flight is read', async () => /\d/.test(await text(id('replay-time'))), 30_000);
   return { page, seen, id };
 }
+/** The first moment of the recording. */
+async function first_us() {
+  const path = `mission=${mission}&limit=1`,
+    firsts = await Promise.all([get(`/api/v1/fixes?${path}`), get(`/api/v1/ranges?${path}`)]);
+  return Math.min(...firsts.map(({ items: [row] }) => row.t_us));
+}
 const seconds = (clock) => clock.split(':').reduce((s, part) => 60 * s + Number(part), 0);
 
 test('. and , step through the events in the order of the flight, each at its own moment', async () => {
@@ -34,9 +40,7 @@ test('. and , step through the events in the order of the flight, each at its ow
     (/(\d+) of (\d+)/.exec(await text(id('replay-events').locator('.meta'))) ?? []).slice(1).map(Number);
   const [at_first, n] = await place();
   assert.ok(n >= 4, `${n} events of the flight`);
-  const path = `mission=${mission}&limit=1`,
-    firsts = await Promise.all([get(`/api/v1/fixes?${path}`), get(`/api/v1/ranges?${path}`)]),
-    from_us = Math.min(...firsts.map(({ items: [row] }) => row.t_us)),
+  const from_us = await first_us(),
     { items } = await get(`/api/v1/missions/${mission}/events?limit=1000`),
     moments = [...new Set(items.map((e) => e.t_us))].sort((a, b) => a - b).filter((t_us) => t_us > from_us);
   const current = async () => ({
@@ -173,8 +177,18 @@ test('after a restart the replay still shows procedure, its reason and the point
   for (const event of before) assert.deepEqual(kept.get(event.id), event, 'as it was');
   const { page, seen, id } = await opened();
   await id('scrubber').press('End');
-  await id('replay-procedure').waitFor({ timeout: 10_000 });
-  assert.match(await text(id('replay-procedure')), /\w{4}/);
+  await id('procedure').waitFor({ timeout: 10_000 });
+  assert.match(await text(id('procedure')), /\w{4}/);
+  const log = (await get(`/api/v1/missions/${mission}/procedure-log?limit=1000`)).items,
+    decision = log.find((e) => e.topic === 'mission.grid' && e.data.candidates.length > 1);
+  assert.ok(decision, 'a decision of the flight was kept');
+  await id('scrubber').fill(String(Math.ceil((decision.t_us - (await first_us())) / 1e4) * 1e4 + 20_000));
+  await id('next-point').waitFor({ timeout: 5000 });
+  await eventually(
+    'the candidates of that decision',
+    async () => (await text(id('next-point'))).includes(`${decision.data.candidates.length} candidates`),
+    5000,
+  );
   assert.ok((await id('replay-events').locator('li').count()) > 0, 'events are listed');
   await picture(page, 'replay-after-restart');
   assert.deepEqual(seen.errors, []);

@@ -7,6 +7,7 @@ import {
   Player,
   poses_of,
   range_of,
+  shown_of,
   span_of,
   type Recording,
 } from '../src/state/recording';
@@ -167,5 +168,54 @@ describe('a stored range', () => {
       const r = range_of('m')({ ...row, predicted })!;
       expect([r.p_los, r.corrected_m]).toEqual([null, 5.3]);
     }
+  });
+});
+
+describe('what the procedure showed', () => {
+  const entry = (t_s: number, topic: string, data: object) => ({
+    t_us: t_s * 1e6,
+    topic,
+    data: { mission: 'm', t_us: t_s * 1e6, ...data },
+  });
+  const log = [
+    entry(9, 'plan', { plan: { waypoints: [{ lon: 1, lat: 2 }], settings: { max_height_m: 12 } } }),
+    entry(10, 'procedure', { status: 'running', step: 'turn', in_step_s: 2 }),
+    entry(12, 'mission.turn', { anchor: '0x2', running: true, samples: [[10, -80]], bearing_deg: null }),
+    entry(17, 'mission.turn', { anchor: '0x2', running: false, samples: [[10, -80], [20, -81]], bearing_deg: 10 }), // prettier-ignore
+    entry(30, 'procedure', { status: 'running', step: 'go_to_point', in_step_s: 0 }),
+    entry(30, 'mission.grid', { rule: 'a_optimal', candidates: [{ lon: 1, lat: 2, value: 4 }], chosen: 0 }),
+  ];
+  const shown = log.flatMap((row) => shown_of(row as never) ?? []);
+
+  it('is that of the moment, forwards and back', () => {
+    const player = new Player(recording);
+    player.learn_procedure(shown, 1000);
+    expect(player.procedure_kept).toBe(true);
+    expect(player.scene.procedure).toBeNull();
+    player.to(14e6, 1000);
+    expect(player.scene.procedure?.value.step).toBe('turn');
+    expect(player.scene.flown).toMatchObject({ high_m: 12, plan: { waypoints: [{ lon: 1, lat: 2 }] } });
+    expect(player.scene.turns.get('0x2')?.value).toMatchObject({ running: true, best: null });
+    expect(player.scene.grid).toBeNull();
+    player.to(40e6, 1000);
+    expect(player.scene.procedure?.value.step).toBe('go_to_point');
+    expect(player.scene.turns.get('0x2')?.value.best).toBe(10);
+    expect(player.scene.grid?.value.candidates).toHaveLength(1);
+    player.to(20e6, 1000);
+    expect(player.scene.procedure?.value.step).toBe('turn');
+    expect(player.scene.grid).toBeNull();
+  });
+  it('has the age that it had then, however long the moment is looked at', () => {
+    const player = new Player(recording);
+    player.learn_procedure(shown, 1000);
+    player.to(14e6, 50_000);
+    expect(50_000 - player.scene.procedure!.at_ms).toBeCloseTo(4000);
+    player.to(14e6, 90_000);
+    expect(90_000 - player.scene.procedure!.at_ms).toBeCloseTo(4000);
+  });
+  it('leaves out what is of no topic, and knows when nothing was kept', () => {
+    expect(shown_of(entry(1, 'rtk', {}) as never)).toBeNull();
+    expect(shown_of({ topic: 'procedure' } as never)).toBeNull();
+    expect(new Player(recording).procedure_kept).toBe(false);
   });
 });

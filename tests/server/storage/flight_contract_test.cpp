@@ -3,6 +3,7 @@
 #include "core/ports/exclusion_store.hpp"
 #include "core/ports/learning_store.hpp"
 #include "core/ports/plan_store.hpp"
+#include "core/ports/procedure_log.hpp"
 #include "core/ports/site_store.hpp"
 #include "core/ports/webhook_store.hpp"
 #include "tests/server/storage/backends.hpp"
@@ -97,6 +98,38 @@ TEST_P(FlightStoreContract, KeepsTheNewestStateOfAProcedureUntilItIsForgotten) {
   EXPECT_TRUE(plans().procedures().value().empty());
   EXPECT_EQ(plans().procedure(m.id).value(), "");
   EXPECT_EQ(plans().keep_procedure(MissionId{}, "{}", k_noon).error().code, Errc::not_found);
+}
+
+TEST_P(FlightStoreContract, NumbersWhatAProcedureShowedAndGivesItBackInPages) {
+  auto& log = db_->stores().procedure_log;
+  const Mission m = stored_mission(), other = stored_mission();
+  const auto entry = [](int i, std::string topic = "procedure") {
+    return ProcedureEntry{UtcTime{k_noon.ns + i}, std::move(topic), "{\"i\":" + std::to_string(i) + "}"};
+  };
+  ASSERT_TRUE(log.append(m.id, std::vector{entry(1), entry(2, "mission.grid")}));
+  ASSERT_TRUE(log.append(other.id, std::vector{entry(7)}));
+  ASSERT_TRUE(log.append(m.id, std::vector{entry(3)}));
+  ASSERT_TRUE(log.append(MissionId{}, std::vector{entry(4)})) << "its mission is gone: nothing to keep";
+  const auto first = log.entries(m.id, 2, 0).value();
+  ASSERT_EQ(first.size(), 2u);
+  EXPECT_EQ(first[0].number, 1u);
+  EXPECT_EQ(first[1].entry.topic, "mission.grid");
+  EXPECT_EQ(first[1].entry.message_json, "{\"i\":2}");
+  EXPECT_EQ(first[1].entry.time.ns, k_noon.ns + 2);
+  const auto second = log.entries(m.id, 2, first[1].number).value();
+  ASSERT_EQ(second.size(), 1u);
+  EXPECT_EQ(second[0].entry.message_json, "{\"i\":3}");
+  EXPECT_TRUE(log.entries(MissionId{}, 10, 0).value().empty());
+}
+
+TEST_P(FlightStoreContract, EndsAPageOfAProcedureBehindTheEntryThatExceedsIt) {
+  auto& log = db_->stores().procedure_log;
+  const Mission m = stored_mission();
+  const std::string half = '"' + std::string(ProcedureLog::k_page_bytes / 2, 'x') + '"';
+  for (int i = 0; i < 3; ++i)
+    ASSERT_TRUE(log.append(m.id, std::vector{ProcedureEntry{k_noon, "procedure", half}}));
+  EXPECT_EQ(log.entries(m.id, 10, 0).value().size(), 2u);
+  EXPECT_EQ(log.entries(m.id, 10, 2).value().size(), 1u);
 }
 
 TEST_P(FlightStoreContract, ExcludesASpanOfTimeOfAnAnchorAndTakesItBackOnce) {

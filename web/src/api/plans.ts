@@ -95,7 +95,7 @@ function ring_of(polygon: Unchecked<Wire<'GeoPolygon'>>): Corner[] {
   const [first, last] = [corners[0], corners[corners.length - 1]];
   return corners.length > 1 && first!.lon === last!.lon && first!.lat === last!.lat ? corners.slice(0, -1) : corners;
 }
-function plan_of(answer: Unchecked<Wire<'Plan'> | Wire<'PlanBody'>>): Plan {
+export function plan_of(answer: Unchecked<Wire<'Plan'> | Wire<'PlanBody'>>): Plan {
   const o: Unchecked<PlanBody & { links: unknown }> = obj(answer);
   const {
     id,

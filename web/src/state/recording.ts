@@ -1,5 +1,6 @@
 /// A stored flight, and the player that feeds a scene from it as the stream would have. No DOM.
 import { get, list, type Wire } from '../api/contract';
+import { plan_of, setting, type Plan } from '../api/plans';
 import {
   all,
   count,
@@ -17,6 +18,7 @@ import {
   type RangeMsg,
   type Unchecked,
 } from '../live/messages';
+import { grid, height, procedure, turn } from '../live/flight_messages';
 import type { Topic } from '../live/stream';
 import { enu_from_geodetic, type Geodetic } from '../map/enu';
 import { Scene } from './scene';
@@ -210,6 +212,53 @@ export async function estimates_over_time(mission: string): Promise<EstimateMsg[
   return all(items ?? [], estimate).sort((a, b) => a.t_us - b.t_us);
 }
 
+/// What the procedure showed at a moment.
+export interface Shown extends Timed {
+  readonly add: (scene: Scene, at_ms: number) => void;
+}
+const adding = <T>(read: (v: unknown) => T | null, put: (scene: Scene, value: T, at_ms: number) => void) => {
+  return (data: unknown): Shown['add'] | null => {
+    const value = read(data);
+    return value && ((scene, at_ms) => put(scene, value, at_ms));
+  };
+};
+const SHOWN: Readonly<Record<string, (data: unknown) => Shown['add'] | null>> = {
+  plan: adding(
+    (data): Plan | null => {
+      const o = obj((data as { plan?: unknown } | null)?.plan);
+      return o && plan_of(o);
+    },
+    (scene, plan) => {
+      scene.flown = { plan, low_m: setting(plan, 'min_height_m'), high_m: setting(plan, 'max_height_m') };
+      scene.estimates_version++;
+    },
+  ),
+  procedure: adding(procedure, (scene, p, at_ms) => scene.add_procedure(p, at_ms)),
+  'mission.grid': adding(grid, (scene, g, at_ms) => scene.add_grid(g, at_ms)),
+  'mission.turn': adding(turn, (scene, t, at_ms) => scene.turns.set(t.anchor, { value: t, at_ms })),
+  'mission.height': adding(height, (scene, h, at_ms) => scene.heights.set(h.anchor, { value: h, at_ms })),
+};
+export function shown_of(row: Unchecked<Wire<'ProcedureLogEntry'>>): Shown | null {
+  const o = obj(row),
+    t_us = num(o?.t_us),
+    add = SHOWN[str(o?.topic)]?.(o?.data) ?? null;
+  return t_us === null || !add ? null : { t_us, add };
+}
+/// In the order of time; none of a flight that was not flown by this product.
+export async function load_procedure(mission: string): Promise<Shown[]> {
+  const { rows } = await pages(
+    ({ cursor }) =>
+      get('/missions/{id}/procedure-log', {
+        path: { id: mission },
+        query: { limit: 1000, ...(cursor ? { cursor } : {}) },
+      }),
+    mission,
+    shown_of,
+    () => undefined,
+  );
+  return rows;
+}
+
 /// First index whose time is above t.
 export function after(rows: readonly Timed[], t_us: number): number {
   let [lo, hi] = [0, rows.length];
@@ -238,6 +287,8 @@ export class Player {
   private estimate = 0;
   /// Null: not there (yet); positions are then what the scene was given.
   private estimates: readonly EstimateMsg[] | null = null;
+  private procedure: readonly Shown[] = [];
+  private shown = 0;
 
   constructor(readonly recording: Recording) {
     this.scene = new Scene(recording.mission.mission);
@@ -252,6 +303,16 @@ export class Player {
     this.begin_anew(this.t_us);
     this.to(this.t_us, now_ms);
   }
+  /// From here on, what the procedure showed is that of the moment.
+  learn_procedure(shown: readonly Shown[], now_ms: number): void {
+    this.procedure = shown;
+    this.begin_anew(this.t_us);
+    this.to(this.t_us, now_ms);
+  }
+  /// Else its events alone say where it stood.
+  get procedure_kept(): boolean {
+    return this.procedure.length > 0;
+  }
   private begin_anew(at: number): void {
     const { anchors, version } = this.scene;
     this.scene = new Scene(this.recording.mission.mission);
@@ -259,6 +320,7 @@ export class Player {
     this.scene.version = version + 1;
     this.pose = after(this.recording.poses, at - BEFORE_US);
     this.range = after(this.recording.ranges, at - BEFORE_US);
+    this.shown = 0;
     this.estimate = 0; // all of them up to the moment: the convergence begins with the flight
   }
   /// Onwards by playing, anywhere by a jump. `now_ms` is the page's clock: what is heard now is fresh.
@@ -283,12 +345,15 @@ export class Player {
     if (estimates)
       for (; this.estimate < estimates.length && estimates[this.estimate]!.t_us <= at; this.estimate++)
         this.scene.add_estimate(estimates[this.estimate]!, age_ms(estimates[this.estimate]!.t_us));
+    for (; this.shown < this.procedure.length && this.procedure[this.shown]!.t_us <= at; this.shown++)
+      this.procedure[this.shown]!.add(this.scene, age_ms(this.procedure[this.shown]!.t_us));
     this.freshen(at, now_ms);
   }
   /// While it stands still, what was fresh at that moment stays fresh.
   private freshen(at_us: number, now_ms: number): void {
     const age_ms = (t: number): number => now_ms - Math.max(0, (at_us - t) / 1000),
-      { pose } = this.scene;
+      { pose, procedure } = this.scene;
+    if (procedure) this.scene.procedure = { value: procedure.value, at_ms: age_ms(procedure.value.t_us) };
     if (pose) this.scene.pose = { value: pose.value, at_ms: age_ms(pose.value.t_us) };
     for (const row of this.scene.ranges.values()) row.at_ms = age_ms(row.last.t_us);
     for (const [id, e] of this.scene.anchors)

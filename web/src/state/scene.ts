@@ -1,4 +1,5 @@
 /// What is known of one flight, as mutable data: the stream writes it, the map reads it every frame, the text four times a second. No DOM, no signals.
+import type { Plan } from '../api/plans';
 import type { GridMsg, ProcedureMsg, ProfileMsg } from '../live/flight_messages';
 import type { EstimateMsg, FixClass, MissionMsg, Pose, RangeMsg, Rtk, Vec3 } from '../live/messages';
 import { sigma_h, sigma_position } from '../map/enu';
@@ -33,6 +34,13 @@ const TRAIL_STEP_M = 0.1; // below a pixel at any scale a flight is watched at; 
 const RECENT_US = 20_000_000; // the 20 s sparkline
 const HISTORY_POINTS = 1200;
 
+/// A plan in the air, and the heights between which it flies.
+export interface Flown {
+  readonly plan: Plan;
+  readonly low_m: number;
+  readonly high_m: number;
+}
+
 export class Scene {
   state: MissionMsg | null = null;
   state_at_ms = -Infinity;
@@ -46,6 +54,7 @@ export class Scene {
   range_at_ms = -Infinity;
   procedure: Heard<ProcedureMsg> | null = null;
   grid: Heard<GridMsg> | null = null;
+  flown: Flown | null = null; ///< of a stored flight: what Live asks for
   readonly turns = new Map<string, Heard<ProfileMsg>>();
   readonly heights = new Map<string, Heard<ProfileMsg>>();
   version = 0; ///< grows with every change: what was drawn of it is still right while it stands

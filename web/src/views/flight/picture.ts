@@ -3,17 +3,12 @@ import { signal } from '@preact/signals';
 import type { Plan } from '../../api/plans';
 import type { GridMsg } from '../../live/flight_messages';
 import { num, obj } from '../../live/messages';
-import { enu_from_geodetic } from '../../map/enu';
+import { enu_from_geodetic, type Geodetic } from '../../map/enu';
 import type { FlightPicture, Heights, Point } from '../../map/flight_layer';
-import type { Scene } from '../../state/scene';
+import type { Flown, Scene } from '../../state/scene';
 import { current_mission, current_scene } from '../../state/store';
 
 /// The plan that is in the air: fetched once per revision, since only a change that was taken makes it another.
-interface Flown {
-  readonly plan: Plan;
-  readonly low_m: number;
-  readonly high_m: number;
-}
 const flown = signal<{ readonly key: string; readonly plan: Flown | null } | null>(null);
 export function follow_plan(): void {
   const p = current_scene()?.procedure?.value,
@@ -48,13 +43,15 @@ export function ranks(
 
 const made = new WeakMap<GridMsg, FlightPicture>(); // the slow picture is drawn often, a decision comes seldom
 export function flight_picture(): FlightPicture | null {
-  const scene = current_scene(),
-    p = scene?.procedure?.value,
-    origin = current_mission.peek()?.origin ?? null,
+  const origin = current_mission.peek()?.origin;
+  return origin ? picture_of(current_scene(), flown.value?.plan ?? null, origin) : null;
+}
+/// Null before there is a procedure.
+export function picture_of(scene: Scene | null, read: Flown | null, origin: Geodetic): FlightPicture | null {
+  const p = scene?.procedure?.value,
     grid = scene?.grid?.value ?? null,
-    read = flown.value?.plan ?? null,
     plan = read?.plan;
-  if (!p || !origin) return null;
+  if (!p) return null;
   const at = (c: { lon: number; lat: number }): Point => {
     const [e, n] = enu_from_geodetic({ lon: c.lon, lat: c.lat, h_m: origin.h_m }, origin);
     return [e, n];

@@ -1,9 +1,10 @@
-/// Where the flight stands in its procedure and why; where it goes next and what that is worth; the turn and the height search while they run.
+/// Where the flight stands in its procedure and why; where it goes next and what that is worth; the turn and the height search while they run. Of a
+/// flight that is on, or of a moment of a stored one.
 import type { ComponentChildren } from 'preact';
 import '../desk.css';
 import type { GridMsg, ProcedureMsg, ProfileMsg, Step } from '../../live/flight_messages';
 import { done_count } from '../../state/done';
-import { current_mission, current_scene, link, now_ms, tick } from '../../state/store';
+import { now_ms, replayed, tick, watched_lost, watched_mission, watched_scene } from '../../state/store';
 import { bearing, fixed } from '../../ui/format';
 import { Chip, Mark, Q } from '../../ui/marks';
 import { Axes, Drawing, line, scale, ticks, room } from '../chart';
@@ -29,12 +30,13 @@ export const sentence = (reason: string): string =>
 
 export function Procedure() {
   tick.value;
-  const scene = current_scene(),
+  const scene = watched_scene(),
+    stored = replayed.value !== null,
     latest = scene?.procedure;
   if (!latest) return null;
   const p = latest.value,
-    stale = link.value === 'lost' || now_ms() - latest.at_ms > 5000,
-    counted = done_count(scene, current_mission.value),
+    stale = watched_lost() || (!stored && now_ms() - latest.at_ms > 5000),
+    counted = done_count(scene, watched_mission.value),
     missed = missed_words(p.status, counted),
     [shape, tone, word] = missed ? (['caution', 'caution', STATUS_LOOK[p.status][2]] as const) : STATUS_LOOK[p.status],
     next = next_step(p.step);
@@ -86,7 +88,7 @@ export function Procedure() {
       {(p.status === 'done' || p.status === 'aborted') && (
         <>
           <FlightTime mission={p.mission} />
-          <AfterLanding mission={p.mission} />
+          {!stored && <AfterLanding mission={p.mission} />}
         </>
       )}
       {p.ended && flying(p) && p.ended !== p.reason && <p class="why says">Why it returns: {p.ended}.</p>}
@@ -181,7 +183,7 @@ function NotDone({ p, gave_up }: { p: ProcedureMsg; gave_up: number }) {
 
 export function NextPoint() {
   tick.value;
-  const scene = current_scene(),
+  const scene = watched_scene(),
     g = scene?.grid?.value,
     p = scene?.procedure?.value;
   if (!g || !p || !flying(p)) return null;
@@ -208,7 +210,7 @@ export function NextPoint() {
         </div>
         {g.reached !== null && (
           <div>
-            <dt>Reached</dt>
+            <dt>Last point gave</dt>
             <dd>{value_words(g, g.reached)}</dd>
           </div>
         )}
@@ -269,7 +271,7 @@ function Ramp({ g }: { g: GridMsg }) {
 
 export function TurnAndHeight() {
   tick.value;
-  const scene = current_scene(),
+  const scene = watched_scene(),
     step = scene?.procedure?.value.step;
   const turns = step === 'turn' ? [...(scene?.turns.values() ?? [])].map((t) => t.value) : [],
     heights = step === 'height_search' ? [...(scene?.heights.values() ?? [])].map((t) => t.value) : [];

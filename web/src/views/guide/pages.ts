@@ -417,6 +417,11 @@ export const PAGES: readonly Page[] = [
           'A stored flight at any moment of it. Space plays, arrows step, comma and dot go to the previous and next event. The ' +
           'strip says REPLAY and its time: nothing in it is live.',
       },
+      {
+        p:
+          'Procedure, next point with its candidates, turns and height searches are what Live showed at that moment. Of a flight ' +
+          'that was imported without them, the events alone say where it stood.',
+      },
     ],
   },
   {

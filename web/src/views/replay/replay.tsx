@@ -4,7 +4,7 @@ import './replay.css';
 import { error_text } from '../../api/client';
 import { live_rows } from '../../api/anchors';
 import { MapBox } from '../../map/map_box';
-import { after, estimates_over_time, load_recording, neighbour, Player } from '../../state/recording';
+import { after, estimates_over_time, load_procedure, load_recording, neighbour, Player } from '../../state/recording';
 import { shown_estimates } from '../../state/done';
 import { backdrops } from '../../state/floors';
 import { alarms_at, decision_at, procedure_at, status_of } from '../../state/moment';
@@ -28,7 +28,7 @@ import { AlarmRow } from '../../ui/alarm_row';
 import { Chip } from '../../ui/marks';
 import { AnchorCard } from '../anchor_card';
 import '../flight/flight.css';
-import { sentence, Stage } from '../flight/procedure';
+import { NextPoint, Procedure, sentence, Stage, TurnAndHeight } from '../flight/procedure';
 import { STATUS_LOOK } from '../flight/words';
 import { EventRow } from '../events';
 import { RangeList } from '../range_list';
@@ -75,6 +75,9 @@ export function Replay({ id }: { id: string | null }) {
         set_problem('');
         if (!recording.poses.length && !recording.ranges.length) return set_moment('nothing');
         made.to(recording.from_us + at_s * 1e6, now_ms());
+        const shown = await load_procedure(mission.mission).catch(() => []);
+        if (gone) return;
+        made.learn_procedure(shown, now_ms());
         show(made);
         set_player(made);
         // Positions of the moment, else what the whole flight gave.
@@ -240,13 +243,13 @@ export function Replay({ id }: { id: string | null }) {
             scene: player?.scene ?? null,
             link_lost: watched_lost(),
             running: true,
-            flight: player && flown_picture(player.recording, player.t_us),
+            flight: player && flown_picture(player.recording, player.t_us, player.scene),
             backdrops: backdrops(mission.origin),
           })}
           onSelect={(a) => (chosen_anchor.value = a)}
           label="Map of the recorded flight"
           follow
-          version={`${mission.mission} ${player?.scene.estimates_version} ${selected}`}
+          version={`${mission.mission} ${scene?.estimates_version} ${scene?.procedure?.value.step} ${selected}`}
         />
         <aside class="side" aria-label="Ranges and anchor of the recording" tabIndex={0}>
           {player && <Then player={player} />}
@@ -324,14 +327,9 @@ export function Replay({ id }: { id: string | null }) {
   );
 }
 
-/// Where the flight stood in its procedure at the moment shown, and which alarms stood.
+/// Which alarms stood at the moment shown, and where the flight stood in its procedure.
 function Then({ player }: { player: Player }) {
-  const { marks } = player.recording,
-    p = procedure_at(marks, player.t_us),
-    alarms = alarms_at(marks, player.t_us),
-    decided = decision_at(marks, player.t_us);
-  const [shape, tone, word] =
-    p?.step === 'done' ? (['off', 'off', 'LANDED'] as const) : STATUS_LOOK[status_of(p?.step ?? 'ready')];
+  const alarms = alarms_at(player.recording.marks, player.t_us);
   return (
     <>
       {alarms.length > 0 && (
@@ -344,6 +342,28 @@ function Then({ player }: { player: Player }) {
           </ul>
         </section>
       )}
+      {player.procedure_kept ? (
+        <>
+          <Procedure />
+          <NextPoint />
+          <TurnAndHeight />
+        </>
+      ) : (
+        <ByEvents player={player} />
+      )}
+    </>
+  );
+}
+
+/// The procedure of a flight of which nothing but its events was kept.
+function ByEvents({ player }: { player: Player }) {
+  const { marks } = player.recording,
+    p = procedure_at(marks, player.t_us),
+    decided = decision_at(marks, player.t_us);
+  const [shape, tone, word] =
+    p?.step === 'done' ? (['off', 'off', 'LANDED'] as const) : STATUS_LOOK[status_of(p?.step ?? 'ready')];
+  return (
+    <>
       {p && (
         <section class="sec-p" data-testid="replay-procedure">
           <div class="hd">
@@ -374,7 +394,7 @@ function Then({ player }: { player: Player }) {
             </p>
           )}
           <p class="why mut">
-            The point it flies to is marked on the map. The other candidates are shown only during a flight.
+            The point it flies to is marked on the map. The other candidates of this flight were not kept.
           </p>
         </section>
       )}
