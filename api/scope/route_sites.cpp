@@ -95,6 +95,8 @@ constexpr auto k_routes = std::to_array<RouteSites>({
     {patch, "/api/v1/sites/{id}", stored},
     {del, "/api/v1/sites/{id}", refused},
     {post, "/api/v1/sites/{id}/datum", stored},
+    {get, "/api/v1/sites/{id}/quota", stored},
+    {put, "/api/v1/sites/{id}/quota", refused},
     {get, "/api/v1/anchors", stored},
     {get, "/api/v1/anchors/{id}", stored},
     {patch, "/api/v1/anchors/{id}", stored},

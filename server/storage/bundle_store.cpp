@@ -1,11 +1,13 @@
 #include "core/ports/bundle_store.hpp"
 
+#include <map>
 #include <set>
 
 #include "core/types/mission.hpp"
 #include "server/storage/bundle_cells.hpp"
 #include "server/storage/bundle_cir.hpp"
 #include "server/storage/measurement_rows.hpp"
+#include "server/storage/site_quota.hpp"
 #include "server/storage/stores.hpp"
 
 namespace anchord::sql {
@@ -162,6 +164,7 @@ class Reader {
       counted << key_.value();
       counted.run();
     }
+    BOOST_OUTCOME_TRYV(check_quotas());
     return std::move(out_);
   }
 
@@ -170,6 +173,7 @@ class Reader {
     for (const auto& spec : site_bundle_specs()) {
       BOOST_OUTCOME_TRY(take(spec));
     }
+    BOOST_OUTCOME_TRYV(check_quotas());
     Query found(c_, k_any_site);
     found << site;
     if (found.step()) return std::move(out_);
@@ -269,10 +273,26 @@ class Reader {
     return boost::outcome_v2::success();
   }
 
+  /// Of sites that something was added to: a bundle as a whole stays within, or is not taken.
+  Result<void> check_quotas() {
+    for (const auto& [site, added] : added_)
+      if (auto error = beyond_quota_now(c_, site, added)) return *std::move(error);
+    return boost::outcome_v2::success();
+  }
+
   void note_added(const BundleSpec& spec, const BundleRow& row) {
     const std::string& table = spec.table.name;
-    if (table == "building_floor" || table == "plan_image" || table == "plan_tiles")
+    const bool anchor = table == "anchor", mission = table == "mission";
+    if (anchor || mission) {
+      const BundleCell& site = row[anchor ? 2 : 1];
+      if (std::holds_alternative<std::monostate>(site)) return;
+      // A flight that comes has measurements.
+      auto& added = added_[SiteId{uuid_of(site)}];
+      ++added[static_cast<std::size_t>(anchor ? QuotaKind::anchors : QuotaKind::missions)];
+      if (mission) ++added[static_cast<std::size_t>(QuotaKind::measurements)];
+    } else if (table == "building_floor" || table == "plan_image" || table == "plan_tiles") {
       places_added_.insert(row[0]);
+    }
   }
 
   /// Pictures come with their floor, or not at all: those of a floor that is here are here, or are others.
@@ -451,6 +471,7 @@ class Reader {
   std::set<Uuid> calibrations_out_;
   std::set<BundleCell> profiles_out_, anchors_out_;  ///< kits by name, anchors by the id of the bundle
   std::set<BundleCell> places_added_;                ///< floors and pictures
+  std::map<SiteId, SiteCounts> added_;
   BundleOutcome out_;
 };
 

@@ -1,4 +1,4 @@
-// Bundles for tokens that are bound to sites, out and in.
+// Bundles for tokens that are bound to sites, out and in; and what a site may store, over REST.
 #include <fstream>
 
 #include "api/formats/zip_archive.hpp"
@@ -203,6 +203,33 @@ TEST_F(SiteTokenBundles, OmloxHasTheProvidersOfTheirOwnFlights) {
     EXPECT_EQ(get_as(*other, "/omlox/v2/trackables/" + trackable + "/locations").status, 404);
   }
   EXPECT_EQ(json(get("/omlox/v2/providers")).size(), 2u);
+}
+
+TEST_F(SiteTokenBundles, QuotasAreSetByWhoSeesAllAndHoldTheNextFlightBack) {
+  const std::string path = "/api/v1/sites/" + bravo_.id("site") + "/quota";
+  const auto set = [&](const Json& limits) { return call(Method::put, path, limits.dump(), Call{}); };
+  const auto limited = set({{"missions", 5}, {"measurements", 20}, {"anchors", nullptr}});
+  ASSERT_EQ(limited.status, 200) << limited.body;
+  EXPECT_EQ(json(limited), Json::parse(R"({"limits":{"missions":5,"measurements":20,"anchors":null},)"
+                                       R"("used":{"missions":1,"measurements":20,"anchors":2},)"
+                                       R"("reached":["measurements"]})"));
+  EXPECT_EQ(json(get_as(bravo_, path)), json(limited));
+  EXPECT_EQ(as(bravo_.who, Method::put, path, {R"({"missions":null})"}).status, 403);
+  EXPECT_EQ(get_as(alpha_, path).status, 404);
+  EXPECT_EQ(set({{"missions", 5}}).status, 422) << "a limit that is forgotten would be none";
+  EXPECT_EQ(set({{"missions", -1}, {"measurements", nullptr}, {"anchors", nullptr}}).status, 422);
+
+  const Json next{
+      {"name", "next"}, {"site", bravo_.id("site")}, {"frame", "wgs84"}, {"track_point", "tag_antenna"}};
+  const auto refused = post_as(bravo_, "/api/v1/missions", next);
+  EXPECT_EQ(refused.status, 409) << refused.body;
+  const std::string detail = json(refused)["detail"];
+  for (const std::string& part : {std::string("bravo works"), std::string("20 measurements"), path})
+    EXPECT_NE(detail.find(part), std::string::npos) << detail;
+  fly(bravo_, bravo_.id("mission"), 40);  // expects every row to be accepted
+  EXPECT_EQ(json(get_as(bravo_, path))["used"]["measurements"], 40);
+  ASSERT_EQ(set({{"missions", nullptr}, {"measurements", nullptr}, {"anchors", nullptr}}).status, 200);
+  EXPECT_EQ(post_as(bravo_, "/api/v1/missions", next).status, 201);
 }
 
 }  // namespace

@@ -64,7 +64,8 @@ TEST_F(Migrate, FindsEveryLandedMigrationAsItWas) {
             "16 6c1d5f68e7d310e7397bff93064ab2eea45da27703ed075ce627ae502304aafe\n"
             "17 5abe94cc37df54a1682fdefdb3c80df458b0b9ae705057063c74231d15138763\n"
             "18 a321ed30ffc793ad0a3abe4a581d763e81c93057111c1585840c155e1043395a\n"
-            "19 0f74240deb1acbb9558d993f5299545713624b395c4c161950a6738675df3792\n");
+            "19 0f74240deb1acbb9558d993f5299545713624b395c4c161950a6738675df3792\n"
+            "20 84c4b4519ba854471f06258236d51fe2308c585274418d8b00ee6d5fcd97d85f\n");
 }
 
 TEST_F(Migrate, KnowsTheDigestOfAPublishedVector) {
