@@ -24,6 +24,7 @@ constexpr Command k_commands[]{
     {"Run a server", anchord::cli::add_token_command},
     {"Run a server", anchord::cli::add_tls_command},
     {"Run a server", anchord::cli::add_backup_command},
+    {"Run a server", anchord::cli::add_cir_archive_command},
     {"Run a server", anchord::cli::add_database_command},
     {"Run a server", anchord::cli::add_gateway_command},
     {"Run a server", anchord::cli::add_sync_command},

@@ -21,7 +21,17 @@ Ordered backup_json(const Backup& backup) {
           {"made_at", to_rfc3339(backup.made)},
           {"bytes", backup.bytes},
           {"sha256", backup.sha256_hex},
-          {"good", backup.good ? Ordered(*backup.good) : Ordered(nullptr)}};
+          {"good", backup.good ? Ordered(*backup.good) : Ordered(nullptr)},
+          {"complete", backup.cir_missing.empty()},
+          {"cir_files", backup.cir_files},
+          {"cir_bytes", backup.cir_bytes},
+          {"cir_missing", backup.cir_missing}};
+}
+
+std::string incomplete(const Backup& backup) {
+  return "backup " + backup.name + " is not complete: " + std::to_string(backup.cir_missing.size()) +
+         " files with impulse responses are missing from it; the first: " + backup.cir_missing.front() +
+         ". Copy them into the folder cir-archive of the server and make another backup";
 }
 
 }  // namespace
@@ -29,11 +39,14 @@ Ordered backup_json(const Backup& backup) {
 Result<Job> begin_backup(const AdminApi& s) {
   return s.jobs.submit("backup", "{}", [&s](JobContext& job) -> Result<JobEnd> {
     job.progress(0, "copy", "");
-    auto made = s.backups.make();
+    auto made = s.backups.make([&job] { return !job.canceled(); });
+    if (!made && made.error().code == Errc::canceled) return std::move(made).error();
     if (!made) {
       s.events.add(EventLevel::warning, "backup.failed", made.error().message);
       return std::move(made).error();
     }
+    if (!made.value().cir_missing.empty())
+      s.events.add(EventLevel::warning, "backup.incomplete", incomplete(made.value()));
     return JobEnd{"/api/v1/backups", made.value().name};
   });
 }

@@ -1,3 +1,4 @@
+#include <limits>
 #include <nlohmann/json.hpp>
 
 #include "api/anchors/geo_service.hpp"
@@ -79,6 +80,40 @@ Response remove(AnchorApi& s, const Request& request) {
   return response;
 }
 
+Ordered quota_json(const SiteQuota& quota) {
+  Ordered limits = Ordered::object(), used = Ordered::object(), reached = Ordered::array();
+  for (std::size_t i = 0; i < k_quota_kinds; ++i) {
+    const auto kind = static_cast<QuotaKind>(i);
+    const std::string word(k_quota_kind_words.word(kind));
+    limits[word] = quota.limits[i] ? Ordered(*quota.limits[i]) : Ordered(nullptr);
+    used[word] = quota.used[i];
+    if (quota.reached(kind)) reached.push_back(word);
+  }
+  return {{"limits", std::move(limits)}, {"used", std::move(used)}, {"reached", std::move(reached)}};
+}
+
+/// All of them are named: a limit that was forgotten would be none.
+Response limit(AnchorApi& s, const Request& request) {
+  const auto site = path_id<SiteId>(request);
+  const auto body = json_body(request);
+  std::vector<FieldError> errors;
+  Fields fields(body, "", errors);
+  SiteLimits limits;
+  std::string words;
+  for (std::size_t i = 0; i < k_quota_kinds; ++i) {
+    const std::string word(k_quota_kind_words.word(static_cast<QuotaKind>(i)));
+    if (fields.is_object() && !body.contains(word))
+      fields.error(word, "required", "must be a number, or null for no limit");
+    limits[i] = fields.integer(word, 0, std::numeric_limits<std::int64_t>::max());
+    words += ' ' + word + ' ' + (limits[i] ? std::to_string(*limits[i]) : "none");
+  }
+  fields.finish();
+  refuse_if_any(errors);
+  value_or_problem(s.sites.set_limits(site, limits));
+  s.audit(request, "site.quota " + to_string(site) + words);
+  return json_response(200, quota_json(value_or_problem(s.sites.quota(site))));
+}
+
 }  // namespace
 
 void add_site_routes(Router& router, AnchorApi& s) {
@@ -92,6 +127,12 @@ void add_site_routes(Router& router, AnchorApi& s) {
                 check_query(request, {});
                 return answer(200, value_or_problem(s.sites.site(path_id<SiteId>(request))));
               }});
+  router.add({Method::get, "/api/v1/sites/{id}/quota", readers(), [&s](const Request& request) {
+                check_query(request, {});
+                return json_response(200,
+                                     quota_json(value_or_problem(s.sites.quota(path_id<SiteId>(request)))));
+              }});
+  router.add({Method::put, "/api/v1/sites/{id}/quota", admin, on(limit)});
   router.add({Method::patch, "/api/v1/sites/{id}", admin, on(patch), 1 << 20, false, true});
   router.add({Method::del, "/api/v1/sites/{id}", admin, on(remove), 1 << 20, false, true});
 }

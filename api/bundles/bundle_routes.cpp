@@ -27,10 +27,15 @@ Response bundle(BundleApi& s, const Request& request) {
 }
 
 Response site_bundle(BundleApi& s, const Request& request) {
-  check_query(request, {});
+  check_query(request, {"flights"});
+  const auto flights = request.query_value("flights").value_or("true");
+  if (flights != "true" && flights != "false")
+    throw_problem(422, "validation", "flights is true or false",
+                  {{"/flights", "wrong_type", "must be true or false"}});
   const Site site = value_or_problem(s.sites.site(path_id<SiteId>(request)));
   auto folder = value_or_problem(SpoolFolder::make(s.spool));
-  const auto file = value_or_problem(make_site_bundle(s, site, request.principal, *folder));
+  const auto file =
+      value_or_problem(make_site_bundle(s, site, request.principal, *folder, flights == "true"));
   return file_answer(std::move(folder), file, k_site_bundle_type, "site-" + to_string(site.id) + ".anchord");
 }
 

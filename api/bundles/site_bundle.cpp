@@ -64,11 +64,9 @@ Error in_entry(const std::string& name, const Error& error) {
 Result<std::vector<Flight>> flights_of(BundleApi& api, const ZipReader& zip, const SiteManifest& manifest,
                                        const SpoolFolder& folder) {
   std::vector<Flight> out;
-  std::size_t n_tables = 0;
   for (const auto& entry : manifest.entries) {
     const bool table = std::ranges::any_of(
         api.bundles.site_tables(), [&](const BundleTable& t) { return bundle_entry_name(t) == entry.name; });
-    n_tables += table ? 1 : 0;
     if (table) continue;
     if (!entry.name.starts_with(k_bundle_flights))
       return make_error(Errc::bad_frame, entry.name + " is not part of a bundle of a site");
@@ -83,8 +81,12 @@ Result<std::vector<Flight>> flights_of(BundleApi& api, const ZipReader& zip, con
                         entry.name + " is the bundle of mission " + to_string(checked.value().mission));
     out.push_back({std::move(opened).value(), std::move(checked).value()});
   }
-  if (n_tables != api.bundles.site_tables().size())
-    return make_error(Errc::bad_frame, "a table of the site is missing");
+  for (const auto& table : api.bundles.site_tables()) {
+    if (table.later || std::ranges::find(manifest.entries, bundle_entry_name(table), &BundleEntry::name) !=
+                           manifest.entries.end())
+      continue;
+    return make_error(Errc::bad_frame, bundle_entry_name(table) + " is missing");
+  }
   return out;
 }
 
@@ -97,15 +99,19 @@ bool SiteImport::added() const {
 }
 
 Result<std::filesystem::path> make_site_bundle(BundleApi& api, const Site& site, const Principal& who,
-                                               const SpoolFolder& folder) {
+                                               const SpoolFolder& folder, bool with_flights) {
   SiteManifest manifest{site.id, site.name, api.made_by, api.clock.now(), {}, {}};
   FolderSink sink(folder, manifest.entries);
   BOOST_OUTCOME_TRY(api.bundles.write_site(site.id, sink));
   BOOST_OUTCOME_TRYV(sink.end());
   const std::size_t n_tables = manifest.entries.size();
-  BOOST_OUTCOME_TRY(const auto missions, missions_of(api.missions, site.id));
+  std::vector<Mission> missions;
+  if (with_flights) {
+    BOOST_OUTCOME_TRY(missions, missions_of(api.missions, site.id));
+  }
   std::vector<std::filesystem::path> files;
   std::uint64_t bytes = 0;
+  for (const auto& table : manifest.entries) bytes += table.bytes;
   for (const auto& mission : missions) {
     if (mission.state == MissionState::recording) {
       manifest.left_out.push_back({mission.id, mission.name, "it is recording"});
@@ -122,7 +128,7 @@ Result<std::filesystem::path> make_site_bundle(BundleApi& api, const Site& site,
     bytes += entry.bytes;
     if (bytes > k_bundle_bytes || manifest.entries.size() >= k_site_entries)
       return make_error(Errc::unsupported,
-                        "the flights of this site are more than one file may have (2 GiB, " +
+                        "the flights and floor plans of this site are more than one file may have (2 GiB, " +
                             std::to_string(k_site_entries) + " flights): take the bundle of each flight");
     manifest.entries.push_back(std::move(entry));
     files.push_back(file);
@@ -130,9 +136,10 @@ Result<std::filesystem::path> make_site_bundle(BundleApi& api, const Site& site,
   const auto file = folder.path("site.anchord");
   BOOST_OUTCOME_TRY(auto zip, ZipWriter::create(file));
   BOOST_OUTCOME_TRYV(zip.add_text(std::string(k_bundle_manifest), write_site_manifest(manifest)));
-  for (std::size_t i = 0; i < n_tables; ++i) {
-    BOOST_OUTCOME_TRYV(
-        zip.add_file(manifest.entries[i].name, folder.path(api.bundles.site_tables()[i].name)));
+  for (const auto& table : api.bundles.site_tables()) {
+    const auto name = bundle_entry_name(table);
+    if (std::ranges::find(manifest.entries, name, &BundleEntry::name) == manifest.entries.end()) continue;
+    BOOST_OUTCOME_TRYV(zip.add_file(name, folder.path(table.name)));
   }
   for (std::size_t i = 0; i < files.size(); ++i) {
     BOOST_OUTCOME_TRYV(zip.add_file(manifest.entries[n_tables + i].name, files[i], true));

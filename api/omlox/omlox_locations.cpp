@@ -4,6 +4,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "api/kit/current_sites.hpp"
 #include "api/omlox/omlox_uuid.hpp"
 #include "api/omlox/omlox_zone.hpp"
 #include "api/stream/hub.hpp"
@@ -100,7 +101,7 @@ std::vector<OmloxLocation> OmloxLocations::newest() {
   if (!newest) return out;
   for (const auto& element : newest->elements) {
     auto one = location(*element.json);
-    if (!one) continue;
+    if (!one || !sees(one->mission)) continue;
     const auto same = std::ranges::find_if(
         out, [&](const OmloxLocation& other) { return other.provider.id == one->provider.id; });
     if (same == out.end())
@@ -109,6 +110,10 @@ std::vector<OmloxLocation> OmloxLocations::newest() {
       *same = std::move(*one);
   }
   return out;
+}
+
+bool OmloxLocations::sees(const MissionId& mission) {
+  return current_sites().all() || missions_.mission(mission).has_value();
 }
 
 bool OmloxLocations::known(const std::string& key) const {

@@ -43,6 +43,7 @@ struct OmloxLocation {
 };
 
 /// Positions of flights as omlox has them, from topic `drone.pose`. Thread-safe.
+/// missions: as who asks may see them, so that lists have their flights alone
 class OmloxLocations {
  public:
   OmloxLocations(const Hub& hub, MissionStore& missions) : hub_(hub), missions_(missions) {}
@@ -60,6 +61,8 @@ class OmloxLocations {
   std::optional<OmloxLocation> location(std::string_view pose_json) const;
 
  private:
+  /// Whether who asks may see it; reads the store for who is bound to sites.
+  bool sees(const MissionId& mission);
   const Hub& hub_;
   MissionStore& missions_;
   Locked<std::map<MissionId, OmloxProvider>> known_;

@@ -34,5 +34,8 @@ std::unique_ptr<AnchorStore> scoped_anchors(AnchorStore& all);
 std::unique_ptr<CalibrationStore> scoped_calibrations(CalibrationStore& all, MissionStore& missions);
 /// anchors: scoped.
 std::unique_ptr<RevisionStore> scoped_revisions(RevisionStore& all, AnchorStore& anchors);
+/// The others: scoped.
+std::unique_ptr<BundleStore> scoped_bundles(const Stores& all, MissionStore& missions,
+                                            CalibrationStore& calibrations, PlaceStore& places);
 
 }  // namespace anchord::api

@@ -46,6 +46,14 @@ class ScopedSites final : public SiteStore {
     if (!current_sites().holds(id)) return absent("site", id);
     return all_.remove(id, expected_version);
   }
+  Result<SiteQuota> quota(const SiteId& id) override {
+    if (!current_sites().holds(id)) return absent("site", id);
+    return all_.quota(id);
+  }
+  Result<void> set_limits(const SiteId& id, const SiteLimits& limits) override {
+    if (!current_sites().holds(id)) return absent("site", id);
+    return all_.set_limits(id, limits);
+  }
 
  private:
   SiteStore& all_;

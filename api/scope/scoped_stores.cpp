@@ -2,6 +2,7 @@
 
 #include "api/scope/scoped.hpp"
 #include "core/ports/anchor_store.hpp"
+#include "core/ports/bundle_store.hpp"
 #include "core/ports/calibration_store.hpp"
 #include "core/ports/frame_store.hpp"
 #include "core/ports/measurement_store.hpp"
@@ -31,12 +32,13 @@ struct ScopedStores::State {
         anchors(scoped_anchors(all.anchors)),
         calibrations(scoped_calibrations(all.calibrations, *missions)),
         revisions(scoped_revisions(all.revisions, *anchors)),
+        bundles(scoped_bundles(all, *missions, *calibrations, *places)),
         stores{
             *measurements, *missions,     *bin,          all.exclusions, all.events,        all.procedure_log,
             *sites,        *anchors,      *calibrations, *revisions,     all.kits,          *frames,
             *plans,        all.campaigns, all.labels,    all.datasets,   all.training_runs, all.models,
             all.jobs,      all.tokens,    all.access,    all.service,    all.webhooks,      *places,
-            all.bundles} {}
+            *bundles} {}
 
   const std::unique_ptr<SiteStore> sites;
   const std::unique_ptr<PlanStore> plans;
@@ -48,6 +50,7 @@ struct ScopedStores::State {
   const std::unique_ptr<AnchorStore> anchors;
   const std::unique_ptr<CalibrationStore> calibrations;
   const std::unique_ptr<RevisionStore> revisions;
+  const std::unique_ptr<BundleStore> bundles;
   const Stores stores;
 };
 

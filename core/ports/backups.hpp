@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -18,6 +19,9 @@ struct Backup {
   std::uint64_t bytes{};
   std::string sha256_hex;
   std::optional<bool> good{};  ///< its digest and integrity were checked by this process; absent: not yet
+  std::size_t cir_files{};     ///< files of impulse responses that it needs and has
+  std::uint64_t cir_bytes{};
+  std::vector<std::string> cir_missing{};  ///< those that it needs and has not, with the reason; empty: whole
 };
 
 /// Copies of the database on disk. Thread-safe.
@@ -25,9 +29,10 @@ class Backups {
  public:
   virtual ~Backups() = default;
   /// Makes one while writes go on, checks it, and drops those older than the newest so many that are whole.
-  /// Takes seconds.
-  /// Errors: storage_full, storage_unavailable, conflict (one is being made).
-  virtual Result<Backup> make() = 0;
+  /// Takes seconds, and where files of impulse responses are copied for the first time as long as a disk
+  /// needs for them. False from `go_on`: stop.
+  /// Errors: storage_full, storage_unavailable, conflict (one is being made), canceled.
+  virtual Result<Backup> make(const std::function<bool()>& go_on) = 0;
   virtual std::vector<Backup> list() const = 0;  ///< newest first, by sequence
   /// Whether one is to be begun now: the newest is older than the schedule wants, or a flight ended since the
   /// last was begun (`flights_ended` only grows). Never while the schedule is off, at most each ten minutes.

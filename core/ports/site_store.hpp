@@ -6,6 +6,7 @@
 #include "core/base/ids.hpp"
 #include "core/base/result.hpp"
 #include "core/types/anchor.hpp"
+#include "core/types/site_quota.hpp"
 
 namespace anchord {
 
@@ -19,6 +20,11 @@ class SiteStore {
   virtual Result<Site> site(const SiteId& id) = 0;
   virtual Result<std::vector<Site>> sites(std::size_t limit, const std::optional<SiteId>& after) = 0;
   virtual Result<void> remove(const SiteId& id, std::uint64_t expected_version) = 0;
+
+  /// What the site may store, and what it stores now. The stores of missions, anchors and bundles hold to it:
+  /// conflict, in the transaction that would go beyond. errors: not_found
+  virtual Result<SiteQuota> quota(const SiteId& id) = 0;
+  virtual Result<void> set_limits(const SiteId& id, const SiteLimits& limits) = 0;
 };
 
 }  // namespace anchord

@@ -1,10 +1,14 @@
 #include <CLI/CLI.hpp>
 #include <cstdio>
+#include <nlohmann/json.hpp>
 
 #include "api/measurements/flight_requests.hpp"
 #include "core/base/text.hpp"
+#include "core/base/to_wire.hpp"
 #include "server/cli/commands.hpp"
 #include "server/cli/config_flags.hpp"
+#include "server/cli/job_answer.hpp"
+#include "server/cli/progress.hpp"
 #include "server/cli/server_address.hpp"
 #include "server/http/http_client.hpp"
 #include "server/runtime/backup_keeper.hpp"
@@ -17,6 +21,7 @@ namespace {
 struct Options {
   std::string data_dir{"anchord-data"}, database, dir, file;
   std::size_t keep{7};
+  bool without_cirs{false};
   std::filesystem::path folder() const {
     return dir.empty() ? std::filesystem::path(data_dir) / "backups" : std::filesystem::path(dir);
   }
@@ -25,6 +30,32 @@ struct Options {
 int fail(const std::string& message, int code = 1) {
   std::fprintf(stderr, "anchord: %s\n", printable(message).c_str());
   return code;
+}
+
+/// 0; where files of impulse responses are missing from it, 1 and which.
+int report_missing(const std::string& backup, const std::vector<std::string>& missing) {
+  if (missing.empty()) return 0;
+  std::fprintf(stderr, "anchord: %s is not complete: %zu files with impulse responses are missing from it\n",
+               printable(backup).c_str(), missing.size());
+  for (const auto& one : missing) std::fprintf(stderr, "  %s\n", printable(one).c_str());
+  return 1;
+}
+
+void print_cirs(std::size_t files, std::uint64_t bytes) {
+  if (files > 0)
+    std::printf("with %zu files of impulse responses, %llu bytes\n", files,
+                static_cast<unsigned long long>(bytes));
+}
+
+/// The backup that a server made.
+Result<nlohmann::ordered_json> made_by(server::HttpClient& client) {
+  BOOST_OUTCOME_TRY(auto made, answer_of_job(client, "/api/v1/backups"));
+  if (!made.is_null()) return made;
+  BOOST_OUTCOME_TRY(const auto answer, client.call("GET", "/api/v1/backups"));
+  const auto list = nlohmann::ordered_json::parse(answer.body, nullptr, false);
+  if (answer.status >= 400 || !list.is_object() || list.value("items", list).empty())
+    return make_error(Errc::unsupported, api::problem_text(answer.body));
+  return list["items"][0];
 }
 
 /// A running server owns the folder and makes the copy itself; none when nobody answers.
@@ -37,12 +68,11 @@ std::optional<int> through_server(const Options& options) {
     return fail("a running server uses this folder and stores its backups in its backup.dir; omit --dir", 2);
   if (const auto token = own_token(options.data_dir); !token.empty())
     client.value().set_header("Authorization", "Bearer " + token);
-  client.value().set_header("Prefer", "wait=600");
-  const auto answer = client.value().call("POST", "/api/v1/backups");
-  if (!answer) return fail(answer.error().message);
-  if (answer.value().status >= 400) return fail(api::problem_text(answer.value().body));
-  std::printf("%s\n", answer.value().body.c_str());
-  return 0;
+  const auto made = made_by(client.value());
+  if (!made) return fail(made.error().message);
+  std::printf("%s\n", to_wire(made.value()).c_str());
+  return report_missing(made.value().value("name", ""),
+                        made.value().value("cir_missing", std::vector<std::string>{}));
 }
 
 /// Whether the rows are where no command of this file reaches.
@@ -60,30 +90,51 @@ int make(const Options& options) {
   auto database = open_database(storage);
   if (!database) return fail(database.error().message);
   const SystemClock clock;
-  server::BackupKeeper keeper(*database.value(), clock, {options.folder(), options.keep, 24, false, nullptr});
-  const auto made = keeper.make();
+  server::BackupKeeper keeper(*database.value(), clock, {options.folder(), options.keep, 24, false});
+  (void)interrupted();  // from here on a signal is asked for
+  const auto made = keeper.make([] { return !interrupted(); });
   if (!made) return fail(made.error().message);
   std::printf("%s  %llu bytes  sha256 %s\n", (options.folder() / made.value().name).c_str(),
               static_cast<unsigned long long>(made.value().bytes), made.value().sha256_hex.c_str());
+  print_cirs(made.value().cir_files, made.value().cir_bytes);
+  return report_missing(made.value().name, made.value().cir_missing);
+}
+
+/// Input that cannot be used, or something that failed.
+int fail(const Error& error) {
+  const bool input = error.code == Errc::not_found || error.code == Errc::unsupported;
+  return fail(error.message, input ? 2 : 1);
+}
+
+int check(const Options& options) {
+  if (const auto whole = check_backup(options.file); !whole) return fail(whole.error());
+  const auto cirs = check_backup_cirs(options.file);
+  if (!cirs) return fail(cirs.error());
+  if (!cirs.value().missing.empty()) return report_missing(options.file, cirs.value().missing);
+  std::printf("%s is complete\n", options.file.c_str());
+  print_cirs(cirs.value().files, cirs.value().bytes);
   return 0;
 }
 
 int restore(const Options& options) {
   if (elsewhere(options)) return fail(k_postgres_backups, 2);
-  const auto old = restore_backup(options.data_dir, options.file);
-  if (!old) {
-    const bool input = old.error().code == Errc::not_found || old.error().code == Errc::unsupported;
-    return fail(old.error().message, input ? 2 : 1);
-  }
+  const auto restored = restore_backup(options.data_dir, options.file, options.without_cirs);
+  if (!restored) return fail(restored.error());
   std::printf("%s is now the database of %s\n", options.file.c_str(), options.data_dir.c_str());
-  if (old.value()) std::printf("the previous database is kept as %s\n", old.value()->c_str());
+  if (restored.value().old)
+    std::printf("the previous database is kept as %s\n", restored.value().old->c_str());
+  print_cirs(restored.value().cirs.files, restored.value().cirs.bytes);
+  (void)report_missing(options.file, restored.value().cirs.missing);
   return 0;
 }
 
 }  // namespace
 
 void add_backup_command(CLI::App& app, int& exit_code) {
-  auto* command = app.add_subcommand("backup", "Copy the database while it is in use, or restore a copy");
+  auto* command = app.add_subcommand(
+      "backup",
+      "Copy the database and its files of impulse responses while they are in use, check or restore "
+      "a copy");
   command->require_subcommand(0, 1);
   const auto options = std::make_shared<Options>();
   const auto common = [&](CLI::App* sub) {
@@ -102,8 +153,14 @@ void add_backup_command(CLI::App& app, int& exit_code) {
   auto* back =
       command->add_subcommand("restore", "Replace the database by a backup; the server must not be running");
   common(back);
-  back->add_option("file", options->file, "the backup")->required();
+  back->add_option("file", options->file, "the backup; the folder cir-archive is beside it")->required();
+  back->add_flag("--without-cir-archive", options->without_cirs,
+                 "restore also where files of impulse responses are missing; what needs them then fails");
   back->callback([&exit_code, options] { exit_code = restore(*options); });
+  auto* checked = command->add_subcommand(
+      "check", "Read a backup whole, with the files of impulse responses that it needs, and compare digests");
+  checked->add_option("file", options->file, "the backup")->required();
+  checked->callback([&exit_code, options] { exit_code = check(*options); });
 }
 
 }  // namespace anchord::cli

@@ -9,6 +9,7 @@ class App;
 namespace anchord::cli {
 
 void add_backup_command(CLI::App& app, int& exit_code);
+void add_cir_archive_command(CLI::App& app, int& exit_code);
 void add_completion_command(CLI::App& app, int& exit_code);
 void add_config_command(CLI::App& app, int& exit_code);
 void add_database_command(CLI::App& app, int& exit_code);

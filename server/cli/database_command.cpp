@@ -12,6 +12,7 @@ namespace {
 
 struct Options {
   std::string from, to;
+  CopyFolders folders;
 };
 
 int fail(const Error& error) {
@@ -58,13 +59,20 @@ int check(const Options& options) {
 int copy(const Options& options) {
   (void)interrupted();
   std::string told;
-  const auto done = copy_database(options.from, options.to, [&](const std::string& table, std::uint64_t) {
-    if (table != told) std::fprintf(stderr, "%s\n", table.c_str());
-    told = table;
-    return !interrupted();
-  });
+  const auto done =
+      copy_database(options.from, options.to, options.folders, [&](const std::string& table, std::uint64_t) {
+        if (table != told) std::fprintf(stderr, "%s\n", table.c_str());
+        told = table;
+        return !interrupted();
+      });
   if (!done) return fail(done.error());
-  for (const auto& table : done.value()) print(table);
+  for (const auto& table : done.value().tables) print(table);
+  const CirCopies& cirs = done.value().cirs;
+  if (cirs.files > 0)
+    std::printf("%zu files of impulse responses, %llu bytes, in %s\n", cirs.files,
+                static_cast<unsigned long long>(cirs.bytes), done.value().cir_archive.c_str());
+  for (const auto& one : cirs.missing)
+    std::fprintf(stderr, "anchord: copied without %s\n", printable(one).c_str());
   return 0;
 }
 
@@ -86,9 +94,17 @@ void add_database_command(CLI::App& app, int& exit_code) {
   checked->callback([&exit_code, options] { exit_code = check(*options); });
   auto* copied = command->add_subcommand(
       "copy",
-      "Copy all rows into an empty database and compare; the same command resumes an interrupted copy");
+      "Copy all rows and their files of impulse responses into an empty database and compare; the same "
+      "command resumes an interrupted copy");
   copied->add_option("from", options->from, place)->required();
   copied->add_option("to", options->to, place)->required();
+  copied->add_option("--from-data-dir", options->folders.from,
+                     "data folder of the server whose rows are in PostgreSQL, with its cir-archive");
+  copied->add_option(
+      "--to-data-dir", options->folders.to,
+      "data folder that the server on the copied PostgreSQL will have [the folder copied from]");
+  copied->add_flag("--without-cir-archive", options->folders.without_cirs,
+                   "copy also where files of impulse responses are missing");
   copied->callback([&exit_code, options] { exit_code = copy(*options); });
 }
 

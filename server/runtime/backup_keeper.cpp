@@ -5,6 +5,7 @@
 #include <fstream>
 #include <tuple>
 
+#include "server/storage/cir_copies.hpp"
 #include "server/storage/sqlite_database.hpp"
 
 namespace anchord::server {
@@ -27,6 +28,12 @@ std::string name_of(std::uint64_t sequence, UtcTime time) {
   std::string text = to_rfc3339(time);
   std::ranges::replace(text, ':', '-');
   return std::string(k_prefix) + number + '-' + text + ".db";
+}
+
+void note_cirs(Backup& backup, CirCopies cirs) {
+  backup.cir_files = cirs.files;
+  backup.cir_bytes = cirs.bytes;
+  backup.cir_missing = std::move(cirs.missing);
 }
 
 /// Number and time of a name of ours; older ones have no number.
@@ -63,6 +70,7 @@ std::vector<Backup> BackupKeeper::list() const {
     if (!made) continue;
     Backup backup{name, made->first, made->second, entry.file_size(error), {}, {}};
     std::ifstream(entry.path().string() + ".sha256") >> backup.sha256_hex;
+    note_cirs(backup, listed_backup_cirs(entry.path()));
     {
       const auto checked = checked_.lock();
       if (const auto at = checked->find(name); at != checked->end()) backup.good = at->second.good;
@@ -117,9 +125,10 @@ void BackupKeeper::drop_old() {
     auto checked = checked_.lock();
     checked->erase(backup.name);
   }
+  sql::drop_unneeded_copies(options_.dir);
 }
 
-Result<Backup> BackupKeeper::make() {
+Result<Backup> BackupKeeper::make(const std::function<bool()>& go_on) {
   const std::unique_lock lock(making_, std::try_to_lock);
   if (!lock) return make_error(Errc::conflict, "a backup is already being made");
   std::error_code error;
@@ -135,14 +144,16 @@ Result<Backup> BackupKeeper::make() {
   const UtcTime now = clock_.now();
   const std::uint64_t sequence = (before.empty() ? 0 : before.front().sequence) + 1;
   const std::string name = name_of(sequence, now);
-  BOOST_OUTCOME_TRY(const auto report, database_.backup(options_.dir / name));
+  BOOST_OUTCOME_TRY(auto report, database_.backup(options_.dir / name, go_on));
   note_checked(name, true);  // backup() checked what it wrote
   {
     auto due = due_.lock();
     due->newest = steady_now();
   }
   drop_old();
-  return Backup{name, sequence, now, report.bytes, report.sha256_hex, true};
+  Backup made{name, sequence, now, report.bytes, report.sha256_hex, true};
+  note_cirs(made, std::move(report.cirs));
+  return made;
 }
 
 /// When the newest backup was made. Without any, the day counts from the start: a fresh installation has

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <mutex>
 #include <optional>
@@ -18,6 +19,7 @@ namespace anchord::server {
 
 /// Backups of one database in one folder, named anchord-<number>-<UTC time>.db; other files there are left
 /// alone. The number says which is newer: a clock that ran ahead must not make every later backup the oldest.
+/// The files of impulse responses that they need are in its folder cir-archive, each once.
 class BackupKeeper final : public Backups {
  public:
   static constexpr std::size_t k_fewest =
@@ -30,7 +32,7 @@ class BackupKeeper final : public Backups {
     const SteadyClock* steady{&system_steady_clock()};  ///< what the schedule runs on
   };
   BackupKeeper(Database& database, const Clock& clock, Options options);
-  Result<Backup> make() override;
+  Result<Backup> make(const std::function<bool()>& go_on) override;
   std::vector<Backup> list() const override;
   bool due(std::uint64_t flights_ended) override;
 
@@ -65,7 +67,7 @@ class BackupKeeper final : public Backups {
 class NoBackups final : public Backups {
  public:
   explicit NoBackups(std::string why) : why_(std::move(why)) {}
-  Result<Backup> make() override { return *refusal(); }
+  Result<Backup> make(const std::function<bool()>&) override { return *refusal(); }
   std::vector<Backup> list() const override { return {}; }
   bool due(std::uint64_t) override { return false; }
   std::optional<Error> refusal() const override { return make_error(Errc::unsupported, why_); }

@@ -1,4 +1,5 @@
 #include "server/storage/measurement_rows.hpp"
+#include "server/storage/site_quota.hpp"
 #include "server/storage/stores.hpp"
 
 namespace anchord::sql {
@@ -96,6 +97,8 @@ class SqlAnchorStore final : public AnchorStore {
   Result<void> update(const Anchor& anchor, std::uint64_t expected_version) override {
     return write_void(gate_, [&](Connection& c) -> std::optional<Error> {
       if (auto error = missing_site(c, anchor.site)) return error;
+      if (const auto before = find_anchor(c, k_by_id, anchor.id); before && before->site != anchor.site)
+        if (auto error = beyond_quota(c, anchor.site, {0, 0, 1})) return error;
       Query query(c, k_anchor_update);
       bind(query, anchor, expected_version + 1);
       query << expected_version;

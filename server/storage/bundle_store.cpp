@@ -1,13 +1,13 @@
 #include "core/ports/bundle_store.hpp"
 
-#include <bit>
-#include <cmath>
-#include <cstring>
+#include <map>
 #include <set>
 
 #include "core/types/mission.hpp"
+#include "server/storage/bundle_cells.hpp"
 #include "server/storage/bundle_cir.hpp"
 #include "server/storage/measurement_rows.hpp"
+#include "server/storage/site_quota.hpp"
 #include "server/storage/stores.hpp"
 
 namespace anchord::sql {
@@ -39,94 +39,6 @@ constexpr const char* k_count_fixes_anew =
     "INSERT INTO mission_fixes (mission_key, n_fixes) SELECT mission_key, count(*) FROM fix WHERE "
     "mission_key = "
     "?1 GROUP BY mission_key";
-
-std::span<const std::byte> bytes_of(const std::string& text) { return std::as_bytes(std::span{text}); }
-
-BundleCell read_cell(Query& query, CellKind kind) {
-  if (query.null()) {
-    query.skip();
-    return std::monostate{};
-  }
-  switch (kind) {
-    case CellKind::integer:
-      return query.integer();
-    case CellKind::real:
-      return query.real();
-    case CellKind::text:
-      return query.text();
-    case CellKind::bytes:
-    case CellKind::id: {
-      const auto bytes = query.blob();
-      return std::string(reinterpret_cast<const char*>(bytes.data()), bytes.size());
-    }
-  }
-  return std::monostate{};
-}
-
-BundleRow read_row(Query& query, const BundleTable& table) {
-  BundleRow row;
-  row.reserve(table.columns.size());
-  for (const auto& column : table.columns) row.push_back(read_cell(query, column.kind));
-  return row;
-}
-
-/// Behind the columns of read_row(): of a range whose impulse response is in a file.
-std::optional<CirDigest> read_moved(Query& query, const BundleSpec& spec) {
-  if (!spec.with_cir || query.null()) return std::nullopt;
-  return read_digest(query);
-}
-
-void bind_cell(Query& query, const BundleCell& cell, CellKind kind) {
-  if (const auto* whole = std::get_if<std::int64_t>(&cell)) {
-    query << *whole;
-  } else if (const auto* real = std::get_if<double>(&cell)) {
-    query << *real;
-  } else if (const auto* text = std::get_if<std::string>(&cell)) {
-    if (kind == CellKind::text)
-      query << *text;
-    else
-      query << bytes_of(*text);
-  } else {
-    query << std::nullopt;
-  }
-}
-
-bool same(const BundleCell& a, const BundleCell& b) {
-  const auto* x = std::get_if<double>(&a);
-  const auto* y = std::get_if<double>(&b);
-  if (x != nullptr && y != nullptr)
-    return std::bit_cast<std::uint64_t>(*x) == std::bit_cast<std::uint64_t>(*y);
-  return a == b;
-}
-
-Uuid uuid_of(const BundleCell& cell) {
-  Uuid id;
-  const auto* text = std::get_if<std::string>(&cell);
-  if (text != nullptr && text->size() == id.bytes.size()) std::memcpy(id.bytes.data(), text->data(), 16);
-  return id;
-}
-
-std::int64_t whole_of(const BundleCell& cell) {
-  const auto* whole = std::get_if<std::int64_t>(&cell);
-  return whole != nullptr ? *whole : -1;
-}
-
-std::string in_words(const BundleCell& cell, const BundleColumn& column) {
-  if (const auto* whole = std::get_if<std::int64_t>(&cell)) {
-    const bool radio = column.name == "network_id" || column.name == "tag" || column.name == "anchor";
-    return radio ? to_string(NetworkId{static_cast<std::uint32_t>(*whole)}) : std::to_string(*whole);
-  }
-  if (const auto* text = std::get_if<std::string>(&cell))
-    return column.kind == CellKind::id ? to_string(uuid_of(cell)) : *text;
-  return "none";
-}
-
-/// "anchor 0x6a2f", "kit_profile xcel 3"
-std::string name_of(const BundleSpec& spec, const BundleRow& row) {
-  std::string name = spec.table.name;
-  for (const std::size_t key : spec.keys) name += ' ' + in_words(row[key], spec.table.columns[key]);
-  return name;
-}
 
 /// What else the rows of a flight name, so that it stands whole on another server.
 struct Named {
@@ -252,6 +164,7 @@ class Reader {
       counted << key_.value();
       counted.run();
     }
+    BOOST_OUTCOME_TRYV(check_quotas());
     return std::move(out_);
   }
 
@@ -260,6 +173,7 @@ class Reader {
     for (const auto& spec : site_bundle_specs()) {
       BOOST_OUTCOME_TRY(take(spec));
     }
+    BOOST_OUTCOME_TRYV(check_quotas());
     Query found(c_, k_any_site);
     found << site;
     if (found.step()) return std::move(out_);
@@ -359,7 +273,41 @@ class Reader {
     return boost::outcome_v2::success();
   }
 
-  bool skipped(const BundleSpec& spec, const BundleRow& row) const {
+  /// Of sites that something was added to: a bundle as a whole stays within, or is not taken.
+  Result<void> check_quotas() {
+    for (const auto& [site, added] : added_)
+      if (auto error = beyond_quota_now(c_, site, added)) return *std::move(error);
+    return boost::outcome_v2::success();
+  }
+
+  void note_added(const BundleSpec& spec, const BundleRow& row) {
+    const std::string& table = spec.table.name;
+    const bool anchor = table == "anchor", mission = table == "mission";
+    if (anchor || mission) {
+      const BundleCell& site = row[anchor ? 2 : 1];
+      if (std::holds_alternative<std::monostate>(site)) return;
+      // A flight that comes has measurements.
+      auto& added = added_[SiteId{uuid_of(site)}];
+      ++added[static_cast<std::size_t>(anchor ? QuotaKind::anchors : QuotaKind::missions)];
+      if (mission) ++added[static_cast<std::size_t>(QuotaKind::measurements)];
+    } else if (table == "building_floor" || table == "plan_image" || table == "plan_tiles") {
+      places_added_.insert(row[0]);
+    }
+  }
+
+  /// Pictures come with their floor, or not at all: those of a floor that is here are here, or are others.
+  bool of_floor_here(const BundleSpec& spec, const BundleRow& row) {
+    const std::string& table = spec.table.name;
+    if (table == "plan_image_part" || table == "plan_tile") return !places_added_.contains(row[0]);
+    if (table != "plan_image" && table != "plan_tiles") return false;
+    if (places_added_.contains(row[1])) return false;
+    if (!stored(spec, row))
+      out_.left_out.push_back({name_of(spec, row), "its floor exists on this server, with its own pictures"});
+    return true;
+  }
+
+  bool skipped(const BundleSpec& spec, const BundleRow& row) {
+    if (of_floor_here(spec, row)) return true;
     if (spec.part == BundlePart::revision) return revisions_out_;
     if (spec.table.name == "kit_profile") return profiles_out_.contains(row[0]);
     if (spec.table.name == "anchor_external_id") return anchors_out_.contains(row[0]);
@@ -391,6 +339,7 @@ class Reader {
       return false;
     }
     BOOST_OUTCOME_TRY(add(spec, row));
+    note_added(spec, row);
     return true;
   }
 
@@ -521,6 +470,8 @@ class Reader {
   bool fresh_{false}, revisions_out_{false};
   std::set<Uuid> calibrations_out_;
   std::set<BundleCell> profiles_out_, anchors_out_;  ///< kits by name, anchors by the id of the bundle
+  std::set<BundleCell> places_added_;                ///< floors and pictures
+  std::map<SiteId, SiteCounts> added_;
   BundleOutcome out_;
 };
 

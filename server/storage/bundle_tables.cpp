@@ -126,6 +126,17 @@ constexpr std::array k_lines{
          "number network_id", k_of_revisions, "t.number, t.network_id"},
 };
 
+constexpr const char* k_of_buildings = "t.building_id IN (SELECT b.id FROM building b WHERE b.site_id = ?1)";
+/// Pictures that a floor names; those that are being written are nobody's yet.
+constexpr const char* k_of_floors =
+    "t.named = 1 AND t.floor_id IN (SELECT f.id FROM building_floor f JOIN building b ON b.id = "
+    "f.building_id WHERE b.site_id = ?1)";
+constexpr const char* k_of_images =
+    "t.image_id IN (SELECT i.id FROM plan_image i JOIN building_floor f ON f.id = i.floor_id JOIN building b "
+    "ON b.id = f.building_id WHERE i.named = 1 AND b.site_id = ?1)";
+constexpr const char* k_of_tiles =
+    "t.tiles_id IN (SELECT i.id FROM plan_tiles i JOIN building_floor f ON f.id = i.floor_id JOIN building b "
+    "ON b.id = f.building_id WHERE i.named = 1 AND b.site_id = ?1)";
 /// Of a site, beside its flights: ?1 is the site.
 constexpr std::array k_site_lines{
     Line{BundlePart::site, "site", k_site_columns, "id", "t.id = ?1", "t.id"},
@@ -134,6 +145,23 @@ constexpr std::array k_site_lines{
     Line{BundlePart::shared, "anchor", k_anchor_columns, "network_id", "t.site_id = ?1", "t.network_id"},
     Line{BundlePart::shared, "anchor_external_id", k_external_id_columns, "anchor_id ordinal",
          "t.anchor_id IN (SELECT a.id FROM anchor a WHERE a.site_id = ?1)", "t.anchor_id, t.ordinal"},
+    Line{BundlePart::site, "building+", "u id u site_id t name r height_m i created_t_ns i version", "id",
+         "t.site_id = ?1", "t.id"},
+    Line{BundlePart::site, "building_floor+",
+         "u id u building_id t name r level r base_height_m t georeference t proposal t structure "
+         "i created_t_ns i version",
+         "id", k_of_buildings, "t.id"},
+    Line{BundlePart::site, "plan_image+",
+         "u id u floor_id i kind i named t media_type i width_px i height_px i bytes t sha256", "id",
+         k_of_floors, "t.id"},
+    Line{BundlePart::site, "plan_image_part+", "u image_id i ordinal b content", "image_id ordinal",
+         k_of_images, "t.image_id, t.ordinal"},
+    Line{BundlePart::site, "plan_tiles+",
+         "u id u floor_id i named i n_levels r m_per_px i width_px i height_px r west_m r north_m i bytes "
+         "t sha256",
+         "id", k_of_floors, "t.id"},
+    Line{BundlePart::site, "plan_tile+", "u tiles_id i level i tile_column i tile_row b content",
+         "tiles_id level tile_column tile_row", k_of_tiles, "t.tiles_id, t.level, t.tile_column, t.tile_row"},
 };
 
 std::vector<std::string> words(std::string_view text) {

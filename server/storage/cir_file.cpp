@@ -251,8 +251,32 @@ fs::path CirFolder::next(const MissionId& mission) const {
 
 void CirFolder::remove_others(const MissionId& mission, const fs::path& keep) const {
   std::error_code ignored;
-  for (const auto& file : files(mission))
-    if (file.filename() != keep.filename()) fs::remove(file, ignored);
+  auto gone = files(mission);
+  std::erase_if(gone, [&](const fs::path& file) { return file.filename() == keep.filename(); });
+  {
+    auto holds = holds_->lock();
+    if (holds->n > 0) {
+      holds->waiting.insert(holds->waiting.end(), gone.begin(), gone.end());
+      return;
+    }
+  }
+  // A copy that is begun only now is of a database that needs them no longer.
+  for (const auto& file : gone) fs::remove(file, ignored);
+}
+
+CirFolder::Hold::Hold(std::shared_ptr<Locked<Holds>> holds) : holds_(std::move(holds)) {
+  auto held = holds_->lock();
+  ++held->n;
+}
+
+CirFolder::Hold::~Hold() {
+  std::vector<fs::path> gone;
+  {
+    auto held = holds_->lock();
+    if (--held->n == 0) gone.swap(held->waiting);
+  }
+  std::error_code ignored;
+  for (const auto& file : gone) fs::remove(file, ignored);
 }
 
 void CirFolder::remove_parts() const {

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "core/base/ids.hpp"
+#include "core/base/locked.hpp"
 #include "core/base/result.hpp"
 #include "core/types/range.hpp"
 
@@ -21,7 +22,13 @@ using CirDigest = std::array<std::uint8_t, 32>;
 CirDigest digest_of(const Cir& cir);
 
 /// Where the files of the archive are: MISSION-N.db, of which the one with the highest N has everything.
+/// Copies of it are the same folder.
 class CirFolder {
+  struct Holds {
+    int n{0};
+    std::vector<std::filesystem::path> waiting;  ///< removed when nobody holds any more
+  };
+
  public:
   CirFolder() = default;  ///< nowhere: nothing is found
   explicit CirFolder(std::filesystem::path dir) : dir_(std::move(dir)) {}
@@ -32,13 +39,26 @@ class CirFolder {
   std::vector<std::filesystem::path> files(const MissionId& mission) const;
   /// A name that no file has.
   std::filesystem::path next(const MissionId& mission) const;
-  /// All files of a mission but this one.
+  /// All files of a mission but this one; where the folder is held, when it is no longer.
   void remove_others(const MissionId& mission, const std::filesystem::path& keep) const;
+  /// While one lives, no file goes: a copy of the database names those that were there when it was begun.
+  class Hold {
+   public:
+    explicit Hold(std::shared_ptr<Locked<Holds>> holds);
+    ~Hold();
+    Hold(const Hold&) = delete;
+    Hold& operator=(const Hold&) = delete;
+
+   private:
+    const std::shared_ptr<Locked<Holds>> holds_;
+  };
+  Hold hold() const { return Hold(holds_); }
   /// What a process that died was writing.
   void remove_parts() const;
 
  private:
   std::filesystem::path dir_;
+  std::shared_ptr<Locked<Holds>> holds_{std::make_shared<Locked<Holds>>()};
 };
 
 /// Writes one file under another name; it has its own when finish() succeeded. What is given up is deleted.

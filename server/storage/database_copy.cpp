@@ -4,6 +4,7 @@
 
 #include "core/base/text.hpp"
 #include "migrations/migration.hpp"
+#include "server/storage/cir_copies.hpp"
 #include "server/storage/postgres_connection.hpp"
 #include "server/storage/postgres_migrate.hpp"
 #include "server/storage/postgres_text.hpp"
@@ -126,9 +127,8 @@ std::vector<sql::TableDigest> digests(Place& place, const std::vector<RowTable>&
   return out;
 }
 
-Result<std::vector<sql::TableDigest>> copy_rows(Place& from, Place& to, const CopyProgress& progress) {
-  const auto tables = sql::row_tables();
-  BOOST_OUTCOME_TRYV(ready(to, from.shown, tables));
+Result<std::vector<sql::TableDigest>> copy_rows(Place& from, Place& to, const std::vector<RowTable>& tables,
+                                                const CopyProgress& progress) {
   from.begin_reading();
   for (const RowTable& table : tables) {
     BOOST_OUTCOME_TRYV(copy_table(from, to, table, progress));
@@ -146,6 +146,38 @@ Result<std::vector<sql::TableDigest>> copy_rows(Place& from, Place& to, const Co
   }
   to.connection->execute("DROP TABLE unfinished_copy");
   return expected;
+}
+
+/// The files that the rows of `from` need, for the database that they go to.
+Result<CopyReport> copy_cirs(Place& from, const Place& to, const CopyFolders& folders,
+                             const CopyProgress& progress) {
+  const auto folder_of = [](const Place& place, const std::filesystem::path& given) {
+    const auto dir = place.postgres() ? given : place.folder->dir();
+    return dir.empty() ? dir : place.postgres() ? dir / "cir-archive" : place.folder->cir_archive();
+  };
+  CopyReport out;
+  const auto needed = sql::needed_cir_files(*from.connection);
+  const auto source = folder_of(from, folders.from);
+  out.cir_archive = folder_of(to, folders.to);
+  if (out.cir_archive.empty()) out.cir_archive = source;
+  if (out.cir_archive.empty() && !needed.empty() && !folders.without_cirs)
+    return make_error(Errc::invalid_argument,
+                      from.shown + " needs " + std::to_string(needed.size()) +
+                          " files with impulse responses: name the data folder of its "
+                          "server (--from-data-dir)");
+  if (out.cir_archive.empty()) return out;
+  const auto go_on = [&] { return progress("cir-archive", 0); };
+  BOOST_OUTCOME_TRY(auto brought,
+                    sql::bring_cir_files(needed, sql::CirFolder(source), sql::CirFolder(out.cir_archive),
+                                         sql::Found::read, go_on));
+  out.cirs = std::move(brought.report);
+  if (out.cirs.missing.empty() || folders.without_cirs) return out;
+  return make_error(Errc::not_found, "nothing was copied: of " + std::to_string(needed.size()) +
+                                         " files with impulse responses " +
+                                         std::to_string(out.cirs.missing.size()) +
+                                         " are missing; the first: " + out.cirs.missing.front() +
+                                         ". Name the data folder beside PostgreSQL (--from-data-dir, "
+                                         "--to-data-dir), or copy without them (--without-cir-archive)");
 }
 
 /// SqlError never leaves this folder.
@@ -175,14 +207,18 @@ Result<std::vector<sql::TableDigest>> digest_database(const std::string& place) 
   });
 }
 
-Result<std::vector<sql::TableDigest>> copy_database(const std::string& from, const std::string& to,
-                                                    const CopyProgress& progress) {
-  return without_throwing([&]() -> Result<std::vector<sql::TableDigest>> {
+Result<CopyReport> copy_database(const std::string& from, const std::string& to, const CopyFolders& folders,
+                                 const CopyProgress& progress) {
+  return without_throwing([&]() -> Result<CopyReport> {
     BOOST_OUTCOME_TRY(auto source, open_place(from));
     if (source.unfinished())
       return make_error(Errc::unsupported, "a copy into " + source.shown + " has not been finished");
     BOOST_OUTCOME_TRY(auto target, open_place(to, true));
-    return copy_rows(source, target, progress);
+    const auto tables = sql::row_tables();
+    BOOST_OUTCOME_TRYV(ready(target, source.shown, tables));
+    BOOST_OUTCOME_TRY(auto report, copy_cirs(source, target, folders, progress));
+    BOOST_OUTCOME_TRY(report.tables, copy_rows(source, target, tables, progress));
+    return report;
   });
 }
 

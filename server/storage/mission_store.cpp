@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <limits>
 
+#include "server/storage/site_quota.hpp"
 #include "server/storage/stores.hpp"
 
 namespace anchord::sql {
@@ -44,6 +45,7 @@ constexpr const char* k_binned =
     "FROM mission_bin b JOIN mission m ON m.mission_key = b.mission_key ORDER BY b.deleted_ran_ns DESC, "
     "b.mission_key DESC";
 constexpr const char* k_site = "SELECT 1 FROM site WHERE id = ?1";
+constexpr const char* k_site_of = "SELECT site_id FROM mission WHERE mission_key = ?1";
 
 Error no_mission(const MissionId& id) { return make_error(Errc::not_found, "no mission " + to_string(id)); }
 
@@ -53,6 +55,13 @@ std::optional<Error> check_site(Connection& connection, const Mission& mission) 
   query << *mission.site;
   if (query.step()) return std::nullopt;
   return make_error(Errc::not_found, "no site " + to_string(*mission.site));
+}
+
+std::optional<SiteId> site_of(Connection& connection, std::int64_t key) {
+  Query query(connection, k_site_of);
+  query << key;
+  if (!query.step()) return std::nullopt;
+  return query.maybe([&] { return query.id<SiteId>(); });
 }
 
 void store_tags(Connection& connection, std::int64_t key, const Mission& mission) {
@@ -118,6 +127,8 @@ class SqlMissionStore final : public MissionStore {
       if (taken.step() && taken.integer() > 0)
         return make_error(Errc::conflict, "mission " + to_string(mission.id) + " exists");
       if (auto error = check_site(c, mission)) return error;
+      // It will measure: of those there must be room for one at least.
+      if (auto error = beyond_quota(c, mission.site, {1, 1, 0})) return error;
       Query query(c, k_insert);
       bind(query, mission);
       store_tags(c, query.returned().value(), mission);
@@ -128,7 +139,10 @@ class SqlMissionStore final : public MissionStore {
   Result<void> update(const Mission& mission) override {
     return write_void(gate_, [&](Connection& c) -> std::optional<Error> {
       if (auto error = check_site(c, mission)) return error;
-      if (!mission_key(c, mission.id)) return no_mission(mission.id);
+      const auto stored = mission_key(c, mission.id);
+      if (!stored) return no_mission(mission.id);
+      if (site_of(c, *stored) != mission.site)
+        if (auto error = beyond_quota(c, mission.site, {1, count_measurements(c, *stored), 0})) return error;
       Query query(c, k_update);
       bind(query, mission);
       const auto key = query.returned();

@@ -81,7 +81,7 @@ class PostgresDatabase final : public Database {
     return health;
   }
 
-  Result<BackupReport> backup(const std::filesystem::path&) override {
+  Result<BackupReport> backup(const std::filesystem::path&, const GoOn&) override {
     return make_error(Errc::unsupported, k_postgres_backups);
   }
   WorkStore* work() override { return work_.get(); }

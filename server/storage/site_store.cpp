@@ -1,5 +1,6 @@
 #include "server/storage/measurement_rows.hpp"
 #include "server/storage/outline_text.hpp"
+#include "server/storage/site_quota.hpp"
 #include "server/storage/stores.hpp"
 
 namespace anchord::sql {
@@ -114,6 +115,20 @@ class SqlSiteStore final : public SiteStore {
       if (query.returned()) return std::nullopt;
       const auto stored = find_site(c, id);
       return stored ? moved_on("the site", expected_version, stored->version) : absent("site", id);
+    });
+  }
+
+  Result<SiteQuota> quota(const SiteId& id) override {
+    return read_value<SiteQuota>(gate_, [&](Connection& c) -> Result<SiteQuota> {
+      if (auto missing = missing_site(c, id)) return *std::move(missing);
+      return read_quota(c, id);
+    });
+  }
+  Result<void> set_limits(const SiteId& id, const SiteLimits& limits) override {
+    return write_void(gate_, [&](Connection& c) -> std::optional<Error> {
+      if (auto missing = missing_site(c, id)) return missing;
+      write_limits(c, id, limits);
+      return std::nullopt;
     });
   }
 

@@ -48,8 +48,9 @@ class SqliteDatabase final : public Database, private sql::Gate {
                  [this] { folder_->fill_reserve(options_.warn_free_bytes); }},
                 {options_.max_queued_rows, options_.max_queued_calls, options_.checkpoint_wal_bytes}),
         readers_([this] { return open_connection(Mode::read_only); }, options_.readers),
+        cirs_(folder_->cir_archive()),
         kept_(
-            *this, [this] { return admit_mission(); }, sql::CirFolder(folder_->cir_archive())) {
+            *this, [this] { return admit_mission(); }, cirs_) {
     if (check_in_background) checker_ = Thread("anchord-check", [this] { check_in_background_thread(); });
   }
   ~SqliteDatabase() override {
@@ -76,10 +77,11 @@ class SqliteDatabase final : public Database, private sql::Gate {
     return health;
   }
 
-  Result<BackupReport> backup(const std::filesystem::path& file) override {
+  Result<BackupReport> backup(const std::filesystem::path& file, const GoOn& go_on) override {
     try {
+      const auto held = cirs_.hold();
       const auto source = open_connection(Mode::read_only);
-      return sql::back_up(*source, file);
+      return sql::back_up(*source, file, &cirs_, go_on);
     } catch (const SqlError& error) {
       return sql::to_error(error);
     }
@@ -147,6 +149,7 @@ class SqliteDatabase final : public Database, private sql::Gate {
   const FilePlace place_{folder_->database()};
   sql::WriteQueue writer_;
   sql::ReaderPool readers_;
+  const sql::CirFolder cirs_;
   sql::SqlStores kept_;
   Thread checker_;
 };

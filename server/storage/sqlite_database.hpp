@@ -3,9 +3,11 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "core/base/enum_table.hpp"
 #include "core/base/result.hpp"
@@ -65,10 +67,18 @@ struct StorageHealth {
   Synchronous synchronous{Synchronous::full};
 };
 
+/// The files with impulse responses that a copy of a database needs to be whole.
+struct CirCopies {
+  std::size_t files{};  ///< that are there
+  std::uint64_t bytes{};
+  std::vector<std::string> missing;  ///< which are not, with the reason of each
+};
+
 struct BackupReport {
   std::filesystem::path file;
   std::uint64_t bytes{};
   std::string sha256_hex;  ///< also written beside it as <file>.sha256
+  CirCopies cirs;          ///< in the folder cir-archive beside it, listed in <file>.sha256 too
 };
 
 /// An open data folder. Everything may be called from any thread; the destructor finishes queued writes,
@@ -80,8 +90,13 @@ class Database {
   /// In the folder cir-archive of the data folder.
   virtual CirArchive& cir_archive() = 0;
   virtual StorageHealth health() = 0;
-  /// Online copy while writes go on: fsynced, integrity-checked, with its SHA-256. The file must not exist.
-  virtual Result<BackupReport> backup(const std::filesystem::path& file) = 0;
+  /// Online copy while writes go on: fsynced, integrity-checked, with its SHA-256, and beside it the files of
+  /// the archive that it needs. The file must not exist. False from `go_on`: canceled.
+  using GoOn = std::function<bool()>;
+  virtual Result<BackupReport> backup(const std::filesystem::path& file, const GoOn& go_on) = 0;
+  Result<BackupReport> backup(const std::filesystem::path& file) {
+    return backup(file, [] { return true; });
+  }
   /// Work that other processes may do; null: this database is of one process.
   virtual WorkStore* work() { return nullptr; }
 };
@@ -96,13 +111,25 @@ Result<std::unique_ptr<Database>> open_database(const StorageOptions& options);
 /// Reads all of it. Errors: not_found, unsupported.
 Result<void> check_backup(const std::filesystem::path& backup);
 
+/// Whether the files of the archive that a backup needs are beside it, each with its SHA-256. Reads all of
+/// them. Errors: unsupported, where the backup cannot be read.
+Result<CirCopies> check_backup_cirs(const std::filesystem::path& backup);
+
+/// The same by <backup>.sha256, in no time.
+CirCopies listed_backup_cirs(const std::filesystem::path& backup);
+
+struct Restored {
+  std::optional<std::filesystem::path> old;  ///< where the old database is now; nothing when there was none
+  CirCopies cirs;
+};
 /// Puts a backup in the place of a folder's database, which nobody may have open. The backup is checked
-/// first (its .sha256 where there is one, integrity_check), and what stood there is kept beside it.
-/// Returns where the old database is now; nothing when there was none.
-/// Errors: conflict (a server has the folder), not_found, unsupported (no anchord database, or damaged),
-/// storage_unavailable, storage_full; the folder is as before then.
-Result<std::optional<std::filesystem::path>> restore_backup(const std::filesystem::path& data_dir,
-                                                            const std::filesystem::path& backup);
+/// first (its .sha256 where there is one, integrity_check), and what stood there is kept beside it. The files
+/// of the archive that it needs are brought into the folder, unless they are there.
+/// without_cirs  also where some of them are missing
+/// Errors: conflict (a server has the folder), not_found, unsupported (no anchord database, damaged, or
+/// without the files that it needs), storage_unavailable, storage_full; the folder is as before then.
+Result<Restored> restore_backup(const std::filesystem::path& data_dir, const std::filesystem::path& backup,
+                                bool without_cirs = false);
 
 /// Short word of the backend's version for /version: the newest migration this program knows.
 int newest_schema_version();

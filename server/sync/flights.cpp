@@ -1,60 +1,19 @@
 // Finished flights, as bundles.
 #include <algorithm>
 #include <array>
-#include <cstdio>
-#include <fstream>
-#include <iterator>
 #include <nlohmann/json.hpp>
 #include <set>
 
 #include "api/formats/bundle.hpp"
 #include "core/base/sha256.hpp"
-#include "core/base/to_wire.hpp"
-#include "server/runtime/private_file.hpp"
 #include "server/sync/peer.hpp"
 #include "server/sync/sync.hpp"
+#include "server/sync/taken.hpp"
 
 namespace anchord::sync {
 namespace {
 
 using Json = nlohmann::json;
-
-constexpr std::uint64_t k_manifest_bytes = 1u << 20;
-
-/// What a centre has taken of each flight: the digest of its own rows, by URL and mission. A saving alone:
-/// without it everything is sent again and found there.
-class Taken {
- public:
-  Taken(std::filesystem::path file, std::string url) : file_(std::move(file)), url_(std::move(url)) {
-    std::ifstream in(file_);
-    all_ = Json::parse(std::string(std::istreambuf_iterator<char>(in), {}), nullptr, false);
-    if (!all_.is_object() || text_of(all_, "schema") != "anchord.sync/1")
-      all_ = Json{{"schema", "anchord.sync/1"}};
-  }
-  bool has(const std::string& mission, const std::string& digest) const {
-    const auto there = all_.find(url_);
-    return there != all_.end() && there->is_object() && text_of(*there, mission.c_str()) == digest;
-  }
-  void forget(const std::string& mission) {
-    if (all_[url_].is_object()) all_[url_].erase(mission);
-  }
-  Result<void> note(const std::string& mission, const std::string& digest) {
-    if (!all_[url_].is_object()) all_[url_] = Json::object();
-    all_[url_][mission] = digest;
-    return server::write_private(file_, to_wire(all_, 1) + "\n");
-  }
-
- private:
-  std::filesystem::path file_;
-  std::string url_;
-  Json all_;
-};
-
-std::string megabytes(std::size_t bytes) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.1f MB", static_cast<double>(bytes) / 1e6);
-  return text;
-}
 
 /// Tables of a bundle whose change sends a flight again. The others are of the surroundings, and of
 /// calibrations, which are compared by their ids: else each flight of a kit would send all before it again.
@@ -68,20 +27,8 @@ struct Bundle {
   std::string bytes;
 };
 
-struct CloseFile {
-  void operator()(std::FILE* file) const { std::fclose(file); }
-};
-
 Result<Bundle> read_bundle(std::string bytes) {
-  // A file without a name: what is killed here leaves nothing behind.
-  const std::unique_ptr<std::FILE, CloseFile> file(std::tmpfile());
-  if (!file || std::fwrite(bytes.data(), 1, bytes.size(), file.get()) != bytes.size() ||
-      std::fflush(file.get()) != 0)
-    return make_error(Errc::storage_full,
-                      "not enough space in /tmp for a bundle of " + megabytes(bytes.size()));
-  BOOST_OUTCOME_TRY(const auto zip,
-                    api::ZipReader::open("/proc/self/fd/" + std::to_string(fileno(file.get()))));
-  BOOST_OUTCOME_TRY(const auto text, zip.text(api::k_bundle_manifest, k_manifest_bytes));
+  BOOST_OUTCOME_TRY(const auto text, manifest_of(bytes));
   BOOST_OUTCOME_TRY(const auto manifest, api::read_bundle_manifest(text));
   Sha256 own;
   for (const auto& entry : manifest.entries) {

@@ -35,6 +35,7 @@ void refused(Outcome& outcome, const SyncOptions& options, const std::string& wh
 Result<Outcome> sync_up(Peer& field, Peer& centre, const SyncOptions& options) {
   Outcome outcome;
   BOOST_OUTCOME_TRYV(check_centre(centre, options));
+  BOOST_OUTCOME_TRYV(send_sites(field, centre, options, outcome));
   BOOST_OUTCOME_TRYV(send_flights(field, centre, options, outcome));
   BOOST_OUTCOME_TRYV(send_models(field, centre, options, outcome));
   BOOST_OUTCOME_TRYV(publish_positions(field, centre, options, outcome));

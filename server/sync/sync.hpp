@@ -53,11 +53,12 @@ struct SyncOptions {
 /// Notes and reports what did not go, with the reason.
 void refused(Outcome& outcome, const SyncOptions& options, const std::string& what);
 
-/// Field to centre: finished flights as bundles, models, published positions. What is there already stays; a
-/// repetition adds nothing. errors: of the links (what arrived has arrived)
+/// Field to centre: sites with their floors, finished flights as bundles, models, published positions. What
+/// is there already stays; a repetition adds nothing. errors: of the links (what arrived has arrived)
 Result<Outcome> sync_up(Peer& field, Peer& centre, const SyncOptions& options);
 
-/// Its three parts. Flights first: positions rest on calibrations that come with them.
+/// Its parts. Flights before positions, which rest on calibrations that come with them.
+Result<void> send_sites(Peer& field, Peer& centre, const SyncOptions& options, Outcome& outcome);
 Result<void> send_flights(Peer& field, Peer& centre, const SyncOptions& options, Outcome& outcome);
 Result<void> send_models(Peer& field, Peer& centre, const SyncOptions& options, Outcome& outcome);
 Result<void> publish_positions(Peer& field, Peer& centre, const SyncOptions& options, Outcome& outcome);

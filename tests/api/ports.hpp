@@ -33,7 +33,9 @@ class NoDevices : public DeviceControl {
 };
 
 struct NoBackups final : Backups {
-  Result<Backup> make() override { return make_error(Errc::storage_unavailable, "none here"); }
+  Result<Backup> make(const std::function<bool()>&) override {
+    return make_error(Errc::storage_unavailable, "none here");
+  }
   std::vector<Backup> list() const override { return {}; }
   bool due(std::uint64_t) override { return false; }
 };

@@ -140,6 +140,8 @@ class SiteTokens : public AppFixture {
         as(out.who, Method::post, "/api/v1/missions/" + ids["mission"] + "/exclusions", {excluded.dump()});
     EXPECT_EQ(exclusion.status, 201) << exclusion.body;
     ids["exclusion"] = json(exclusion).value("id", "");
+    ids["provider"] = json(as(out.who, Method::get, "/omlox/v2/providers"))[0];
+    ids["trackable"] = json(as(out.who, Method::get, "/omlox/v2/trackables"))[0];
     const auto job =
         as(out.who, Method::post, "/api/v1/calibrations", {Json{{"missions", {ids["mission"]}}}.dump()});
     EXPECT_EQ(job.status, 202) << job.body;

@@ -14,12 +14,19 @@ using api::SiteRule;
 /// The path with what its parameters name; `of`: by the kind of thing that is.
 std::string with_params(const std::string& pattern, const std::map<std::string, std::string>& of) {
   static const std::vector<std::pair<std::string, std::string>> k_ids{
-      {"/api/v1/missions/", "mission"}, {"/api/v1/plans/", "plan"},
-      {"/api/v1/frames/", "frame"},     {"/api/v1/sites/", "site"},
-      {"/api/v1/anchors/", "anchor"},   {"/api/v1/calibrations/", "calibration"},
-      {"/api/v1/jobs/", "job"},         {"/api/v1/buildings/", "building"},
-      {"/api/v1/floors/", "floor"},     {"/api/v1/ranges/", "range"},
-      {"/omlox/v2/zones/", "floor"}};
+      {"/api/v1/missions/", "mission"},
+      {"/api/v1/plans/", "plan"},
+      {"/api/v1/frames/", "frame"},
+      {"/api/v1/sites/", "site"},
+      {"/api/v1/anchors/", "anchor"},
+      {"/api/v1/calibrations/", "calibration"},
+      {"/api/v1/jobs/", "job"},
+      {"/api/v1/buildings/", "building"},
+      {"/api/v1/floors/", "floor"},
+      {"/api/v1/ranges/", "range"},
+      {"/omlox/v2/zones/", "floor"},
+      {"/omlox/v2/providers/", "provider"},
+      {"/omlox/v2/trackables/", "trackable"}};
   std::string path = pattern;
   const auto put = [&](const std::string& name, const std::string& value) {
     const auto at = path.find('{' + name + '}');
@@ -56,6 +63,7 @@ class SiteTokenRoutes : public SiteTokens {
     auto out = named(bravo_);
     for (auto& [of, id] : out)
       if (of != "exclusion" && of != "network_id") id = to_string(make_uuid_v7(clock_.now()));
+    out["provider"] = "gnss-" + out["trackable"];
     out["range"] = "999999";
     out["number"] = "999";
     return out;

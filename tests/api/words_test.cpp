@@ -279,6 +279,7 @@ TEST(WireWords, AreThoseOfOpenApi) {
       {"FlightTime.against_forecast", words(flight::k_against_forecast_words)},
       {"AnchorGoal.source", words(k_goal_source_words)},
       {"POST /api/v1/missions/{id}/cir-archive.to", words(api::k_cirs_to_words)},
+      {"SiteQuota.reached", words(k_quota_kind_words)},
       {"MissionAction.action", words({"finish", "take_devices"}, flight::k_flight_action_words)},
       {"MissionAction.mode", words(flight::k_flight_mode_words)},
       {"Procedure.mode", words(flight::k_flight_mode_words)},

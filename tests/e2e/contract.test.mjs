@@ -106,6 +106,10 @@ test('a local frame, fitted to the published anchors', async () => {
   const site = await call('GET', `/api/v1/sites/${ids.site}`, { expect: 200 });
   const mapped = { projected_epsg: 25831, crs: { frame: 'ETRS89' } };
   await call('PATCH', `/api/v1/sites/${ids.site}`, merge(site.headers.get('etag'), mapped));
+  const limits = { missions: 1000, measurements: null, anchors: null };
+  await call('PUT', `/api/v1/sites/${ids.site}/quota`, { expect: 200, json: limits });
+  await call('PUT', `/api/v1/sites/${ids.site}/quota`, { expect: 422, json: { missions: 10 } });
+  assert.deepEqual((await call('GET', `/api/v1/sites/${ids.site}/quota`, { expect: 200 })).json.limits, limits);
   for (const { properties } of (await call('GET', '/api/v1/anchors', { expect: 200 })).json.features) {
     const path = `/api/v1/anchors/${properties.network_id}`;
     const { headers } = await call('GET', path, { expect: 200 });

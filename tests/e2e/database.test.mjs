@@ -2,7 +2,7 @@
 // what is refused.
 import assert from 'node:assert/strict';
 import { execFileSync, spawn } from 'node:child_process';
-import { existsSync, mkdtempSync, renameSync, rmSync } from 'node:fs';
+import { existsSync, mkdtempSync, readdirSync, renameSync, rmSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { after, before, test } from 'node:test';
@@ -136,4 +136,78 @@ test('a copy into rows, from nothing, or of a folder in use is refused, and chan
     'nothing was copied',
     async () => (await postgres.psql('SELECT count(*) FROM mission', 'empty')) === '0',
   );
+});
+
+test('impulse responses in files go along with a backup and with a copy, and are never missing in silence', async () => {
+  const files = (dir) => readdirSync(join(dir, 'cir-archive')).filter((name) => name.endsWith('.db'));
+  const digest = async (server) => {
+    const answer = await server.fetch(`/api/v1/missions/${mission}/ranges.gpkg`);
+    const rows = await (await server.fetch(`/api/v1/ranges?mission=${mission}&cir=true&limit=1000`)).json();
+    assert.equal(answer.status, 200);
+    return JSON.stringify(rows.items.map((row) => row.cir ?? null));
+  };
+  let server = await startServer({ dataDir: flown });
+  const before = await digest(server);
+  const cli = (...words) => run([...words, '--data-dir', flown]);
+  const moved = await cli('cir-archive', 'move', mission);
+  assert.equal(moved.code, 0, moved.stderr);
+  assert.match(moved.stdout, new RegExp(`RESPONSES IN[^]*${mission}.* file +\\d+ +\\d+\\n`));
+  assert.match((await cli('cir-archive')).stdout, new RegExp(mission));
+  const [listed] = JSON.parse((await cli('cir-archive', 'list', '--json')).stdout);
+  assert.deepEqual([listed.here, listed.file], [true, `${mission}-1.db`]);
+  assert.equal((await cli('cir-archive', 'move', '00000000-0000-7000-8000-000000000000')).code, 1);
+  assert.equal(await digest(server), before);
+
+  // A backup of the running server, elsewhere.
+  const made = await cli('backup');
+  assert.equal(made.code, 0, made.stderr);
+  const backup = JSON.parse(made.stdout);
+  assert.deepEqual([backup.complete, backup.cir_files, backup.cir_missing], [true, 1, []]);
+  const file = join(flown, 'backups', backup.name);
+  assert.match((await run(['backup', 'check', file])).stdout, /is complete\nwith 1 files/);
+  assert.match(
+    execFileSync('sha256sum', ['-c', `${backup.name}.sha256`], { cwd: join(flown, 'backups'), encoding: 'utf8' }),
+    new RegExp(`cir-archive/${mission}-1\\.db: OK`),
+  );
+  await server.dispose();
+  const elsewhere = join(folder, 'elsewhere');
+  const restored = await run(['backup', 'restore', file, '--data-dir', elsewhere]);
+  assert.equal(restored.code, 0, restored.stderr);
+  assert.deepEqual(files(elsewhere), files(flown));
+  server = await startServer({ dataDir: elsewhere });
+  assert.equal(await digest(server), before);
+  await server.dispose();
+
+  // A copy to PostgreSQL that is served with another folder, and back.
+  const there = await address('archived'),
+    beside = join(folder, 'beside'),
+    home = join(folder, 'home');
+  const copied = await database('copy', flown, there, '--to-data-dir', beside);
+  assert.equal(copied.code, 0, copied.stderr);
+  assert.match(copied.stdout, /1 files of impulse responses, \d+ bytes, in .*beside/);
+  server = await startServer({ dataDir: beside, args: ['--database', there], env: postgres.env });
+  assert.equal(await digest(server), before);
+  await server.dispose();
+  const unnamed = await database('copy', there, home);
+  assert.match(unnamed.stderr, /--from-data-dir/);
+  assert.equal((await database('copy', there, home, '--from-data-dir', beside)).code, 0);
+  assert.equal((await database('check', there, home)).code, 0);
+
+  // Without the file: the backup is made, and everybody is told what it lacks.
+  rmSync(join(home, 'cir-archive'), { recursive: true });
+  const less = await run(['backup', '--data-dir', home]);
+  assert.equal(less.code, 1);
+  assert.match(less.stderr, new RegExp(`is not complete: 1 files[^]*${mission}`));
+  const without = join(
+    home,
+    'backups',
+    readdirSync(join(home, 'backups')).find((name) => name.endsWith('.db')),
+  );
+  assert.equal((await run(['backup', 'check', without])).code, 1);
+  const refused = await run(['backup', 'restore', without, '--data-dir', join(folder, 'new')]);
+  assert.equal(refused.code, 2);
+  assert.match(refused.stderr, /--without-cir-archive/);
+  const lacking = await database('copy', home, await address('lacking'));
+  assert.notEqual(lacking.code, 0);
+  assert.match(lacking.stderr, /--without-cir-archive/);
 });

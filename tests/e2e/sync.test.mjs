@@ -9,6 +9,7 @@ import { join } from 'node:path';
 import { after, before, test } from 'node:test';
 import { ndjson, simulatedFlight } from './flight.mjs';
 import { LinkProxy } from './gateway.mjs';
+import { placed_floor, room_png } from './room.mjs';
 import { binary, eventually, run, startServer } from './server.mjs';
 
 const folder = mkdtempSync(join(tmpdir(), 'anchord sync '));
@@ -391,6 +392,29 @@ test('where both published it shows both positions and asks; centre leaves them,
   assert.equal((await counted(centre)).revisions.length, revisions);
   const [newest] = (await ok(centre, '/api/v1/revisions?limit=1')).items;
   assert.match(newest.note, /anchord sync from http.*: kept instead of revision \d+ of the centre/);
+});
+
+test('buildings, floors and their plans go with their site, once', async () => {
+  const points = [
+    [100, 100, 0, 0],
+    [700, 100, 30, 0],
+    [100, 500, 0, -20],
+  ];
+  const floor = await placed_floor(field, { origin: { lon: 3.713, lat: 51.023, h_m: 55 }, png: room_png(), points });
+  const path = `/api/v1/floors/${floor.id}`;
+  const dry = await sync('--keep', 'centre', '--dry-run');
+  assert.match(dry.stderr, /site [0-9a-f-]+ with its floors: would send/);
+  assert.equal((await centre.fetch(path)).status, 404);
+  const sent = await sync('--keep', 'centre');
+  assert.equal(sent.code, 0, sent.stdout + sent.stderr);
+  assert.deepEqual(await ok(centre, path), await ok(field, path));
+  const there = Buffer.from(await (await centre.fetch(`${path}/plan`)).arrayBuffer());
+  assert.ok(there.equals(room_png()), 'the picture, byte for byte');
+  const tile = async (server) => Buffer.from(await (await server.fetch(`${path}/plan/tiles/0/0/0`)).arrayBuffer());
+  assert.ok((await tile(centre)).equals(await tile(field)), 'its tiles too');
+  const again = await sync('--keep', 'centre');
+  assert.equal(again.code, 0, again.stderr);
+  assert.doesNotMatch(again.stderr, /with its floors/);
 });
 
 test('what cannot go is refused with what to do', async () => {

@@ -10,6 +10,7 @@
 namespace anchord::test {
 namespace {
 
+const std::function<bool()> k_on = [] { return true; };
 constexpr double k_300_days_h = 300 * 24;
 
 struct HandSteady final : SteadyClock {
@@ -63,7 +64,7 @@ TEST_F(BackupFiles, KeepsTheNewestAndNothingOfOthers) {
   std::ofstream(copies() / "before-migration-2.db") << "not ours to delete";
   for (int i = 0; i < 9; ++i) {
     clock_.pass_h(1);
-    ASSERT_TRUE(backups.make());
+    ASSERT_TRUE(backups.make(k_on));
   }
   const auto kept = backups.list();
   ASSERT_EQ(kept.size(), 7u);
@@ -78,10 +79,10 @@ TEST_F(BackupFiles, KeepsTheNewestAndNothingOfOthers) {
 TEST_F(BackupFiles, KeepsEachNewOneAfterTheClockRanAhead) {
   auto backups = keeper();
   clock_.step_h(k_300_days_h);
-  for (int i = 0; i < 7; ++i) ASSERT_TRUE(backups.make());
+  for (int i = 0; i < 7; ++i) ASSERT_TRUE(backups.make(k_on));
   clock_.step_h(-k_300_days_h);
   for (int i = 0; i < 3; ++i) {
-    const auto made = backups.make();
+    const auto made = backups.make(k_on);
     ASSERT_TRUE(made);
     EXPECT_TRUE(std::filesystem::exists(copies() / made.value().name));
     EXPECT_EQ(backups.list().front().name, made.value().name);
@@ -94,7 +95,7 @@ TEST_F(BackupFiles, NumbersGoOnAfterFilesOfBeforeThereWereNumbers) {
   std::filesystem::create_directories(copies());
   std::ofstream(copies() / "anchord-2030-01-01T00-00-00.000000Z.db")
       << "of an older anchord, its clock ahead";
-  const auto made = keeper().make();
+  const auto made = keeper().make(k_on);
   ASSERT_TRUE(made);
   EXPECT_EQ(made.value().sequence, 1u);
   const auto all = keeper().list();
@@ -104,7 +105,7 @@ TEST_F(BackupFiles, NumbersGoOnAfterFilesOfBeforeThereWereNumbers) {
 
 TEST_F(BackupFiles, NeverFallBelowSevenGoodOnesAndABadOneCountsForNothing) {
   auto backups = keeper(1);
-  for (int i = 0; i < 7; ++i) ASSERT_TRUE(backups.make());
+  for (int i = 0; i < 7; ++i) ASSERT_TRUE(backups.make(k_on));
   ASSERT_EQ(backups.list().size(), 7u) << "asked for one, kept seven";
   const auto spoil = [&](const std::string& name) {
     std::fstream file(copies() / name, std::ios::in | std::ios::out | std::ios::binary);
@@ -115,10 +116,10 @@ TEST_F(BackupFiles, NeverFallBelowSevenGoodOnesAndABadOneCountsForNothing) {
   const auto all = backups.list();
   spoil(all[1].name);
   std::filesystem::remove(copies() / (all[2].name + ".sha256"));
-  ASSERT_TRUE(backups.make());
-  ASSERT_TRUE(backups.make());
+  ASSERT_TRUE(backups.make(k_on));
+  ASSERT_TRUE(backups.make(k_on));
   EXPECT_EQ(backups.list().size(), 9u) << "seven good ones among nine: nothing may go";
-  ASSERT_TRUE(backups.make());
+  ASSERT_TRUE(backups.make(k_on));
   const auto left = backups.list();
   ASSERT_EQ(left.size(), 9u) << "the oldest good one went";
   EXPECT_EQ(std::ranges::count(left, std::optional(false), &Backup::good), 2);
@@ -130,7 +131,7 @@ TEST_F(BackupFiles, AreDueByTheSteadyClockWhateverTheSystemClockSays) {
   EXPECT_FALSE(backups.due(0));
   clock_.step_h(k_300_days_h);
   EXPECT_FALSE(backups.due(0)) << "a step ahead is no day that passed";
-  ASSERT_TRUE(backups.make());
+  ASSERT_TRUE(backups.make(k_on));
   clock_.step_h(-2 * k_300_days_h);
   clock_.pass_h(23);
   EXPECT_FALSE(backups.due(0));
@@ -146,7 +147,7 @@ TEST_F(BackupFiles, AreDueEachDayAndAfterEveryFlightButNotAllTheTime) {
   clock_.pass_h(24.1);
   EXPECT_TRUE(backups.due(0));
   EXPECT_FALSE(backups.due(0)) << "just begun";
-  ASSERT_TRUE(backups.make());
+  ASSERT_TRUE(backups.make(k_on));
   clock_.pass_h(23);
   EXPECT_FALSE(backups.due(0));
   clock_.pass_h(0.01);
@@ -162,7 +163,7 @@ TEST_F(BackupFiles, AreDueEachDayAndAfterEveryFlightButNotAllTheTime) {
 
 TEST_F(BackupFiles, ArePutBackWithWhatStoodThereKept) {
   const auto before = mission("in the backup");
-  const auto made = keeper().make();
+  const auto made = keeper().make(k_on);
   ASSERT_TRUE(made) << made.error().message;
   clock_.pass_h(1);
   const auto after = mission("made later");
@@ -176,15 +177,15 @@ TEST_F(BackupFiles, ArePutBackWithWhatStoodThereKept) {
   EXPECT_EQ(database_->stores().missions.mission(after).error().code, Errc::not_found);
   // And back again: nothing was lost by it.
   database_.reset();
-  ASSERT_TRUE(old.value());
-  ASSERT_TRUE(restore_backup(data(), *old.value()));
+  ASSERT_TRUE(old.value().old);
+  ASSERT_TRUE(restore_backup(data(), *old.value().old));
   open();
   EXPECT_TRUE(database_->stores().missions.mission(after));
 }
 
 TEST_F(BackupFiles, AreRefusedWhenTheyAreNotWhatWasBackedUp) {
   mission("kept");
-  const auto made = keeper().make();
+  const auto made = keeper().make(k_on);
   ASSERT_TRUE(made);
   database_.reset();
   const auto copy = copies() / made.value().name;

@@ -16,7 +16,7 @@ import {
 import { handover_url } from '../api/missions';
 import type { EstimateMsg, MissionMsg } from '../live/messages';
 import { enu_from_geodetic } from '../map/enu';
-import { may, of_every_site } from '../state/session';
+import { may } from '../state/session';
 import { keep_draft } from '../state/drafts';
 import { current_scene, revision, say } from '../state/store';
 import { accuracy, date, fixed } from '../ui/format';
@@ -233,7 +233,7 @@ export function Publish({ mission }: { mission: MissionMsg }) {
             <a class="btn" href={report_url(draft.id)} target="_blank" rel="noreferrer" data-testid="report">
               Report to print
             </a>
-            {of_every_site.value && mission.state !== 'recording' && (
+            {mission.state !== 'recording' && (
               <a
                 class="btn"
                 href={handover_url(mission.mission)}

@@ -4,7 +4,7 @@ import { error_text } from '../../api/client';
 import { site_bundle_url } from '../../api/bundles';
 import { devices as fetch_devices, type Device } from '../../api/devices';
 import { change_site, create_site, sites as fetch_sites, type BaseSource, type Site } from '../../api/site';
-import { may, of_every_site } from '../../state/session';
+import { may } from '../../state/session';
 import { say } from '../../state/store';
 import { accuracy, fixed, latlon, plain } from '../../ui/format';
 import { Empty, NotLoaded } from '../../ui/empty';
@@ -124,17 +124,15 @@ export function BasePanel() {
             <dt>Site</dt>
             <dd>
               {site.name}
-              {of_every_site.value && (
-                <a
-                  class="btn small"
-                  href={site_bundle_url(site.id)}
-                  download
-                  data-testid="site-bundle"
-                  title="The site with its plans, anchors and finished flights, for another anchord server or as a copy"
-                >
-                  Download all of it
-                </a>
-              )}
+              <a
+                class="btn small"
+                href={site_bundle_url(site.id)}
+                download
+                data-testid="site-bundle"
+                title="The site with its plans, floors, anchors and finished flights, for another anchord server or as a copy"
+              >
+                Download all of it
+              </a>
             </dd>
           </div>
           <div>

@@ -10,7 +10,7 @@ import {
   stored_flights,
   type StoredFlight,
 } from '../../api/missions';
-import { may, of_every_site } from '../../state/session';
+import { may } from '../../state/session';
 import { load_missions } from '../../state/archive';
 import { events, say, when_back } from '../../state/store';
 import { Empty } from '../../ui/empty';
@@ -101,7 +101,7 @@ export function FlightsPanel() {
                 <td>{grouped(f.n_ranges)}</td>
                 <td>{grouped(f.n_fixes)}</td>
                 <td>
-                  {of_every_site.value && f.state !== 'recording' && (
+                  {f.state !== 'recording' && (
                     <a
                       class="btn small"
                       href={handover_url(f.id)}
@@ -112,7 +112,7 @@ export function FlightsPanel() {
                       Download
                     </a>
                   )}
-                  {of_every_site.value && f.state !== 'recording' && (
+                  {f.state !== 'recording' && (
                     <a
                       class="btn small"
                       href={flight_bundle_url(f.id)}
