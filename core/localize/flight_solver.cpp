@@ -6,6 +6,7 @@
 #include <set>
 
 #include "core/localize/clock_offset.hpp"
+#include "core/localize/direction_doubt.hpp"
 #include "core/localize/flight_checks.hpp"
 #include "core/localize/flight_digest.hpp"
 #include "core/localize/flight_verdict.hpp"
@@ -311,6 +312,22 @@ FlightSolution describe(Work& work, const FlightData& flight) {
   return solution;
 }
 
+/// Delays that the ranges may hide: the regions hold them.
+void add_delay_doubts(Work& work) {
+  const auto note = [&](std::size_t n_wider, const char* why) {
+    if (n_wider == 0) return;
+    work.rows.notes.push_back(std::to_string(n_wider) + " of " + std::to_string(work.rows.anchors.size()) +
+                              " anchors are less certain because " + why);
+  };
+  note(
+      add_scatter_doubt(work.rows, work.prior, work.options, work.fit),
+      "their ranges scatter more from some directions than from others: an obstacle there may lengthen them");
+  note(add_sector_doubt(work.rows, work.options, work.fit),
+       "their ranges fit better if those from one side are too long: an obstacle there may lengthen them");
+  note(add_direction_doubt(work.rows, work.options, work.fit),
+       "the errors of their ranges depend on the direction: walls and a roof may lengthen them");
+}
+
 /// What is asked of a flight as a whole, after all of them are solved.
 Result<void> check_flight(const FlightData& flight, std::vector<Work>& all, std::size_t i,
                           const FlightOptions& options) {
@@ -409,19 +426,7 @@ Result<std::vector<FlightSolution>> solve_flights(std::span<const FlightData* co
   if (!options.fixed_bias_m) {
     for (Work& work : all) add_doubt(work.fit, work.gate);
   }
-  for (Work& work : all) {
-    if (const std::size_t n = add_scatter_doubt(work.rows, work.prior, work.options, work.fit))
-      work.rows.notes.push_back(
-          std::to_string(n) + " of " + std::to_string(work.rows.anchors.size()) +
-          " anchors are less certain because their ranges scatter more from some directions than from "
-          "others: an obstacle there may lengthen them");
-  }
-  for (Work& work : all) {
-    if (const std::size_t n = add_sector_doubt(work.rows, work.options, work.fit))
-      work.rows.notes.push_back(std::to_string(n) + " of " + std::to_string(work.rows.anchors.size()) +
-                                " anchors are less certain because their ranges fit better if those from one "
-                                "side are too long: an obstacle there may lengthen them");
-  }
+  for (Work& work : all) add_delay_doubts(work);
   for (std::size_t i = 0; i < all.size(); ++i) {
     BOOST_OUTCOME_TRY(check_flight(*flights[i], all, i, options));
   }

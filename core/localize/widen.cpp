@@ -26,6 +26,18 @@ void widen_in_plane(double sigma_m, Eigen::Matrix4d& covariance_m2) {
       axes.eigenvectors() * lacking_m2.asDiagonal() * axes.eigenvectors().transpose();
 }
 
+void hold(const Eigen::Matrix3d& least_m2, Dims dims, Eigen::Matrix4d& covariance_m2) {
+  const int n = axes_of(dims);
+  const Eigen::LLT<Eigen::MatrixXd> root(covariance_m2.topLeftCorner(n, n));
+  if (root.info() != Eigen::Success || !least_m2.allFinite()) return;
+  // In units of what is claimed: whatever is larger than one is lacking.
+  const Eigen::MatrixXd half = root.matrixL().solve(least_m2.topLeftCorner(n, n));
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> axes(root.matrixL().solve(half.transpose()));
+  const Eigen::MatrixXd ways = root.matrixL() * axes.eigenvectors();
+  covariance_m2.topLeftCorner(n, n) +=
+      ways * (axes.eigenvalues().array() - 1.0).max(0.0).matrix().asDiagonal() * ways.transpose();
+}
+
 bool much_wider(const Eigen::Matrix4d& now_m2, const Eigen::Matrix4d& before_m2, Dims dims) {
   const int n = axes_of(dims);
   return now_m2.topLeftCorner(n, n).trace() > 1.21 * before_m2.topLeftCorner(n, n).trace();

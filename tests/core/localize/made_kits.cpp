@@ -1,6 +1,7 @@
 #include "tests/core/localize/made_kits.hpp"
 
 #include <Eigen/Geometry>
+#include <array>
 #include <cmath>
 #include <numbers>
 
@@ -31,6 +32,32 @@ Eigen::Matrix<double, 5, 1> harmonics(const Eigen::Vector3d& way) {
 struct Way {
   Eigen::Vector3d at_m;
   double course_rad{};
+};
+
+/// A box, and what its faces delay: east, west, north, south, roof.
+struct Building {
+  Eigen::Vector3d half_m;  ///< of the roof the height
+  std::array<double, 5> late_m{};
+
+  static Building draw(const Eigen::Vector3d& half_m, double share, Random& random) {
+    Building building{half_m};
+    for (double& m : building.late_m) m = between(random, 0, 1) < share ? between(random, 0.1, 0.8) : 0.0;
+    return building;
+  }
+  /// Of the face that a ray outwards leaves through first.
+  double late(const Eigen::Vector3d& from_m, const Eigen::Vector3d& way) const {
+    double nearest = 1.0, m = 0;
+    const auto ask = [&](double wall_m, int axis, std::size_t face) {
+      const double at = (wall_m - from_m[axis]) / way[axis];
+      if (!(at > 0) || at >= nearest) return;
+      nearest = at;
+      m = late_m[face];
+    };
+    for (int axis = 0; axis < 2; ++axis)
+      ask(std::copysign(half_m[axis], way[axis]), axis, 2 * static_cast<std::size_t>(axis) + (way[axis] < 0));
+    if (way.z() > 0) ask(half_m.z(), 2, 4);
+    return m;
+  }
 };
 
 /// Round the walls, up and down.
@@ -76,6 +103,8 @@ const char* word(Spoilage spoilage) {
       return "0 to 20 m";
     case Spoilage::late_side:
       return "late side";
+    case Spoilage::walls:
+      return "walls";
   }
   return "";
 }
@@ -115,6 +144,8 @@ KitFlight fly(const MadeKit& kit, const std::string& name, Random& random, Spoil
   const double blocked_from_rad = between(random, 0, 2 * std::numbers::pi);
   const double noise_m = between(random, 0.02, 0.06);
   const int n_anchors = static_cast<int>(between(random, 4, 7));
+  const Building building =
+      spoilage == Spoilage::walls ? Building::draw({wall_x_m, wall_y_m, top_m}, share, random) : Building{};
   for (int a = 0; a < n_anchors; ++a) {
     const NetworkId id{static_cast<std::uint32_t>(0x6000 + a)};
     flight.anchor_names[id] = to_string(id);
@@ -160,6 +191,9 @@ KitFlight fly(const MadeKit& kit, const std::string& name, Random& random, Spoil
         }
         case Spoilage::one_anchor:
           late = a == 0;
+          break;
+        case Spoilage::walls:
+          range.distance_m += building.late(at, -ray);
           break;
       }
       if (late && spoilage == Spoilage::far_off)

@@ -26,8 +26,18 @@ struct MadeKit {
 MadeKit draw_kit(double bias_m, Random& random);
 
 /// How ranges are spoilt beyond what every flight has. One side: by a delay that scatters; late side: by 0.5
-/// m, alike on all of them.
-enum class Spoilage : std::uint8_t { none, scattered, bursts, one_sided, one_anchor, far_off, late_side };
+/// m, alike on all of them; walls: those through each wall and through the roof by an amount of its own, 0.1
+/// to 0.8 m, or by nothing.
+enum class Spoilage : std::uint8_t {
+  none,
+  scattered,
+  bursts,
+  one_sided,
+  one_anchor,
+  far_off,
+  late_side,
+  walls
+};
 const char* word(Spoilage spoilage);
 
 /// One flight of a kit round a building of its own, 60 to 120 s; walls, heights, radii and anchors are drawn.
