@@ -46,11 +46,11 @@ Result<void> copy_pages(SqliteConnection& source, const std::filesystem::path& f
                     "backup to " + file.string() + ": " + sqlite3_errstr(code));
 }
 
-/// "ok", or what is damaged.
-std::string check_copy(const std::filesystem::path& part, std::vector<NeededCirFile>& needed) {
+/// "ok", or what is damaged. `needed`: null where the database is of an older version, or none of ours.
+std::string check_copy(const std::filesystem::path& part, std::vector<NeededCirFile>* needed) {
   SqliteConnection copy(part, SqliteConnection::Mode::read_only, Synchronous::full, std::nullopt);
   auto found = copy.check(true);
-  if (found == "ok") needed = needed_cir_files(copy);
+  if (found == "ok" && needed != nullptr) *needed = needed_cir_files(copy);
   return found;
 }
 
@@ -81,14 +81,13 @@ Result<BackupReport> back_up(SqliteConnection& source, const std::filesystem::pa
     return copied.error();
   }
   std::vector<NeededCirFile> needed;
-  const auto found = check_copy(part, needed);
+  const auto found = check_copy(part, cirs != nullptr ? &needed : nullptr);
   std::filesystem::remove(part.string() + "-wal", error);
   std::filesystem::remove(part.string() + "-shm", error);
   if (found != "ok") return make_error(Errc::storage_unavailable, "backup: the copy is damaged: " + found);
   BOOST_OUTCOME_TRY(sync_path(part));
   BackupReport report;
   BOOST_OUTCOME_TRY(report.sha256_hex, sha256_of_file(part));
-  if (cirs == nullptr) needed.clear();
   const CirFolder copies = copies_beside(file);
   auto brought = bring_cir_files(needed, cirs == nullptr ? copies : *cirs, copies, Found::listed, go_on);
   if (!brought) {
