@@ -308,7 +308,9 @@ const bool k_avx2 = __builtin_cpu_supports("avx2") != 0;
 #else
 constexpr bool k_avx2 = false;
 template <class Taps>
-constexpr auto in_avx2 = in_any_registers<Taps>;
+std::optional<CirShape> in_avx2(const Taps& taps, std::optional<double> first_path_idx, const CirOptions& o) {
+  return in_any_registers(taps, first_path_idx, o);
+}
 #endif
 
 }  // namespace
