@@ -15,7 +15,7 @@ namespace {
 constexpr std::size_t k_page_bytes = 4u << 20, k_most_rows = 5000;
 constexpr const char* k_columns =
     "SELECT m.name, p.name, p.type, p.pk FROM sqlite_schema m JOIN pragma_table_info(m.name) p "
-    "WHERE m.type = 'table' AND m.name <> 'schema_migration' ORDER BY m.name, p.cid";
+    "WHERE m.type = 'table' AND m.name NOT IN ('schema_migration', 'server_lease') ORDER BY m.name, p.cid";
 constexpr const char* k_references =
     "SELECT m.name, f.\"table\" FROM sqlite_schema m JOIN pragma_foreign_key_list(m.name) f "
     "WHERE m.type = 'table' AND m.name <> f.\"table\"";

@@ -23,8 +23,9 @@ struct RowTable {
   std::string list() const;      ///< "a, b, c"
 };
 
-/// Every table of this program's newest version but schema_migration, in an order in which rows can be added:
-/// what is named stands before what names it. The same in both databases (postgres_test.cpp).
+/// Every table of this program's newest version but schema_migration and server_lease, which are of the
+/// database itself, in an order in which rows can be added: what is named stands before what names it. The
+/// same in both databases (postgres_test.cpp).
 std::vector<RowTable> row_tables();
 
 /// Rows in the order of the key, a few mebibytes at a time.
