@@ -98,6 +98,11 @@ struct App::State {
   Config config;
   std::function<std::string()> doctor;
   SystemClock clock;
+  struct Commanding {
+    api::Application* application{nullptr};
+    bool taken_over{false};
+  };
+  Locked<Commanding> commanding;  ///< outlives the lease in the database, which may end it
   std::unique_ptr<Database> database;
   std::unique_ptr<Backups> backups;
   std::unique_ptr<Metrics> metrics;
@@ -118,11 +123,6 @@ struct App::State {
   std::vector<Listener> listeners;
   std::shared_ptr<TlsKeeper> tls;  ///< null: no TLS
   bool stopped{false};
-  struct Commanding {
-    api::Application* application{nullptr};
-    bool taken_over{false};
-  };
-  Locked<Commanding> commanding;
 
   Result<void> open_rows(const Waiting& waiting);
   void abandon(std::string_view why);
@@ -170,9 +170,9 @@ Result<void> App::State::open_rows(const Waiting& waiting) {
     return make_error(Errc::invalid_argument,
                       "standby: a folder has one server; give --database, which several can reach");
   wish.stopping = waiting.stopping;
-  wish.waits = [&waiting](std::string_view other) {
+  wish.waits = [ready = waiting.ready](std::string_view other) {
     log(LogLevel::info, "standing by", {{"server", other}});
-    if (waiting.ready) waiting.ready();
+    if (ready) ready();
   };
   wish.lost = [this](std::string_view why) { abandon(why); };
   BOOST_OUTCOME_TRY(database, open_store(address, options, std::move(wish)));
@@ -183,7 +183,7 @@ Result<void> App::State::open_rows(const Waiting& waiting) {
 
 /// The other server may command the aircraft by now.
 void App::State::abandon(std::string_view why) {
-  log(LogLevel::error, "taken over from: ending", {{"why", why}});
+  log(LogLevel::error, "ending: another server has the database, or takes it", {{"why", why}});
   {
     auto c = commanding.lock();
     c->taken_over = true;

@@ -2,15 +2,13 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
-#include "api/measurements/flight_requests.hpp"
 #include "core/base/text.hpp"
 #include "core/base/to_wire.hpp"
 #include "server/cli/commands.hpp"
 #include "server/cli/config_flags.hpp"
-#include "server/cli/job_answer.hpp"
 #include "server/cli/progress.hpp"
+#include "server/cli/rest_json.hpp"
 #include "server/cli/server_address.hpp"
-#include "server/http/http_client.hpp"
 #include "server/runtime/backup_keeper.hpp"
 #include "server/storage/data_folder.hpp"
 #include "server/storage/postgres_database.hpp"
@@ -48,27 +46,23 @@ void print_cirs(std::size_t files, std::uint64_t bytes) {
 }
 
 /// The backup that a server made.
-Result<nlohmann::ordered_json> made_by(server::HttpClient& client) {
-  BOOST_OUTCOME_TRY(auto made, answer_of_job(client, "/api/v1/backups"));
-  if (!made.is_null()) return made;
-  BOOST_OUTCOME_TRY(const auto answer, client.call("GET", "/api/v1/backups"));
-  const auto list = nlohmann::ordered_json::parse(answer.body, nullptr, false);
-  if (answer.status >= 400 || !list.is_object() || list.value("items", list).empty())
-    return make_error(Errc::unsupported, api::problem_text(answer.body));
-  return list["items"][0];
+Result<nlohmann::json> made_by(RestClient& client) {
+  BOOST_OUTCOME_TRY(const auto job, post_json(client, "/api/v1/backups", nlohmann::json::object()));
+  BOOST_OUTCOME_TRYV(result_of_job(client, job));
+  BOOST_OUTCOME_TRY(auto list, get_json(client, "/api/v1/backups"));
+  if (list["items"].empty()) return make_error(Errc::not_found, "the backup is gone again");
+  return std::move(list["items"][0]);
 }
 
 /// A running server owns the folder and makes the copy itself; none when nobody answers.
 std::optional<int> through_server(const Options& options) {
   const auto url = running_server(options.data_dir);
   if (!url) return std::nullopt;
-  auto client = server::HttpClient::to(*url, std::chrono::seconds(620));
-  if (!client || !client.value().call("GET", "/healthz")) return std::nullopt;  // an address left by a crash
+  auto client = RestClient::make(*url, own_token(options.data_dir), interrupted);
+  if (!client || !client.value()->get("/healthz")) return std::nullopt;  // an address left by a crash
   if (!options.dir.empty())
     return fail("a running server uses this folder and stores its backups in its backup.dir; omit --dir", 2);
-  if (const auto token = own_token(options.data_dir); !token.empty())
-    client.value().set_header("Authorization", "Bearer " + token);
-  const auto made = made_by(client.value());
+  const auto made = made_by(*client.value());
   if (!made) return fail(made.error().message);
   std::printf("%s\n", to_wire(made.value()).c_str());
   return report_missing(made.value().value("name", ""),

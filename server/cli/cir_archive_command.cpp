@@ -3,19 +3,18 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
-#include "api/measurements/flight_requests.hpp"
 #include "core/base/text.hpp"
 #include "core/base/to_wire.hpp"
 #include "server/cli/commands.hpp"
-#include "server/cli/job_answer.hpp"
+#include "server/cli/progress.hpp"
+#include "server/cli/rest_json.hpp"
 #include "server/cli/server_address.hpp"
 #include "server/cli/text_table.hpp"
-#include "server/http/http_client.hpp"
 
 namespace anchord::cli {
 namespace {
 
-using Ordered = nlohmann::ordered_json;
+using Json = nlohmann::json;
 
 struct Options {
   std::string data_dir{"anchord-data"}, url, mission, to{"file"};
@@ -27,40 +26,29 @@ int fail(const std::string& message) {
   return 1;
 }
 
-Result<server::HttpClient> server_of(const Options& options) {
+Result<std::unique_ptr<RestClient>> server_of(const Options& options) {
   const auto url = options.url.empty() ? running_server(options.data_dir) : std::optional(options.url);
   if (!url)
     return make_error(Errc::not_found, "no server is running on the data folder " + options.data_dir +
                                            ": start anchord serve, or give --url");
-  BOOST_OUTCOME_TRY(auto client, server::HttpClient::to(*url, std::chrono::seconds(620)));
-  if (const auto token = own_token(options.data_dir); !token.empty())
-    client.set_header("Authorization", "Bearer " + token);
-  return client;
+  return RestClient::make(*url, own_token(options.data_dir), interrupted);
 }
 
-Result<Ordered> archived(server::HttpClient& client) {
-  BOOST_OUTCOME_TRY(const auto answer, client.call("GET", "/api/v1/cir-archive"));
-  const auto json = Ordered::parse(answer.body, nullptr, false);
-  if (answer.status >= 400 || !json.is_object())
-    return make_error(Errc::unsupported, api::problem_text(answer.body));
-  return json.value("items", Ordered::array());
-}
-
-std::string word(const Ordered& object, const char* key) {
-  const auto it = object.find(key);
-  return it != object.end() && it->is_string() ? it->get<std::string>() : std::string();
+Result<Json> archived(RestClient& client) {
+  BOOST_OUTCOME_TRY(const auto json, get_json(client, "/api/v1/cir-archive"));
+  return json.value("items", Json::array());
 }
 
 /// Where the responses of a flight are.
-std::string place_of(const Ordered& one) {
+std::string place_of(const Json& one) {
   if (one.value("n_moved", std::uint64_t{0}) == 0) return "database";
   return one.value("here", false) ? "file" : "MISSING";
 }
 
-void print(const Ordered& items) {
+void print(const Json& items) {
   std::vector<std::vector<std::string>> rows;
   for (const auto& one : items)
-    rows.push_back({word(one, "mission"), word(one, "name"), place_of(one),
+    rows.push_back({text_of(one, "mission"), text_of(one, "name"), place_of(one),
                     std::to_string(one.value("n_moved", std::uint64_t{0})),
                     std::to_string(one.value("bytes", std::uint64_t{0}) >> 10)});
   for (const auto& line : table_lines({{"MISSION", false, false},
@@ -72,7 +60,7 @@ void print(const Ordered& items) {
     std::printf("%s\n", line.c_str());
 }
 
-int show(const Options& options, const Ordered& items) {
+int show(const Options& options, const Json& items) {
   if (options.json)
     std::printf("%s\n", to_wire(items, 1).c_str());
   else if (items.empty())
@@ -85,22 +73,25 @@ int show(const Options& options, const Ordered& items) {
 int list(const Options& options) {
   auto client = server_of(options);
   if (!client) return fail(client.error().message);
-  const auto items = archived(client.value());
+  const auto items = archived(*client.value());
   return items ? show(options, items.value()) : fail(items.error().message);
 }
 
+Result<Json> moved(const Options& options) {
+  BOOST_OUTCOME_TRY(auto client, server_of(options));
+  BOOST_OUTCOME_TRY(const auto job, post_json(*client, "/api/v1/missions/" + options.mission + "/cir-archive",
+                                              {{"to", options.to}}));
+  BOOST_OUTCOME_TRYV(result_of_job(*client, job));
+  BOOST_OUTCOME_TRY(const auto items, archived(*client));
+  Json out = Json::array();
+  for (const auto& one : items)
+    if (text_of(one, "mission") == options.mission) out.push_back(one);
+  return out;
+}
+
 int move(const Options& options) {
-  auto client = server_of(options);
-  if (!client) return fail(client.error().message);
-  const auto done = answer_of_job(client.value(), "/api/v1/missions/" + options.mission + "/cir-archive",
-                                  to_wire(Ordered{{"to", options.to}}));
-  if (!done) return fail(done.error().message);
-  const auto items = archived(client.value());
-  if (!items) return fail(items.error().message);
-  Ordered moved = Ordered::array();
-  for (const auto& one : items.value())
-    if (word(one, "mission") == options.mission) moved.push_back(one);
-  return show(options, moved);
+  const auto items = moved(options);
+  return items ? show(options, items.value()) : fail(items.error().message);
 }
 
 }  // namespace
@@ -115,7 +106,7 @@ void add_cir_archive_command(CLI::App& app, int& exit_code) {
       ->capture_default_str()
       ->envname("ANCHORD_DATA_DIR");
   command->add_option("--url", options->url, "URL of another server");
-  command->add_flag("--json", options->json, "Print JSON as the server sends it");
+  command->add_flag("--json", options->json, "Print JSON");
   command->require_subcommand(0, 1);
   command->fallthrough();
   command->add_subcommand("list", "Flights with a file: where it is, how much is in it")

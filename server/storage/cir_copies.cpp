@@ -71,8 +71,8 @@ struct Way {
 Result<fs::path> copy_one(const fs::path& from, const NeededCirFile& needed, const Way& way) {
   const CirFolder& to = way.to;
   std::error_code error;
-  fs::path file = to.dir() / needed.file;
-  if (fs::exists(file, error)) file = to.next(needed.mission);
+  // Not by the name in the backup, which whoever made that wrote and which may lead out of the folder.
+  const fs::path file = to.next(needed.mission);
   const fs::path part = file.string() + k_part;
   auto done = write_bytes(from, part, way.go_on);
   if (done) done = sync_path(part);

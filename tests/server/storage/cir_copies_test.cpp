@@ -8,6 +8,7 @@
 #include "server/storage/backup.hpp"
 #include "server/storage/cir_copies.hpp"
 #include "server/storage/database_copy.hpp"
+#include "server/storage/sqlite_connection.hpp"
 #include "tests/server/storage/backends.hpp"
 
 namespace anchord {
@@ -126,6 +127,22 @@ TEST_F(BackupCirs, AreInTheBackupThatNeedsThemAndComeBackWithIt) {
   db_.reset();
   fs::remove_all(data());
   const auto there = restored("one.db", "another");
+  EXPECT_EQ(samples(*there, mission), expected);
+}
+
+TEST_F(BackupCirs, OfAForgedNameStayInTheirFolder) {
+  const auto mission = archived(*db_);
+  const auto expected = samples(*db_, mission);
+  backed_up("one.db");
+  fs::remove(at("one.db.sha256"));
+  {
+    sql::SqliteConnection forged(at("one.db"), sql::SqliteConnection::Mode::create, Synchronous::full,
+                                 std::nullopt);
+    forged.execute("UPDATE cir_archive SET file = '../../outside.db'");
+  }
+  const auto there = restored("one.db", "another");
+  EXPECT_FALSE(fs::exists(dir_.path() / "outside.db"));
+  EXPECT_THAT(names_in(dir_.path() / "another" / "cir-archive"), SizeIs(1));
   EXPECT_EQ(samples(*there, mission), expected);
 }
 
