@@ -23,7 +23,7 @@ constexpr const char* k_name = "SELECT name FROM site WHERE id = ?1";
 
 constexpr const char* k_remedy[k_quota_kinds] = {"remove flights permanently (those in the bin count)",
                                                  "remove flights permanently (those in the bin count)",
-                                                 "retire and move anchors to another site"};
+                                                 "move anchors to another site"};
 
 std::optional<SiteLimits> read_limits(Connection& c, const SiteId& site) {
   Query query(c, k_limits);

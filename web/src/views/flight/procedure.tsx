@@ -210,7 +210,7 @@ export function NextPoint() {
         </div>
         {g.reached !== null && (
           <div>
-            <dt>Last point gave</dt>
+            <dt>Reached at the last point</dt>
             <dd>{value_words(g, g.reached)}</dd>
           </div>
         )}
