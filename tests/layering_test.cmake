@@ -119,7 +119,7 @@ set(server/mqtt_source "^(mosquitto\\.h$|poll\\.h$|resolv\\.h$|sys/|unistd\\.h$)
 
 # Of JSON only its name, as in api.
 set(server_header "^(${everywhere}|boost/|nlohmann/json_fwd\\.hpp$)")
-set(server_source "^(CLI/|linux/(filter|landlock|seccomp)\\.h$|spawn\\.h$|httplib\\.h$|spdlog/|fmt/|prometheus/|openssl/|toml\\+\\+/|toml\\.hpp$|nlohmann/json|zlib\\.h$|sys/|netdb\\.h$|netinet/|arpa/|unistd\\.h$|fcntl\\.h$|signal\\.h$|poll\\.h$|pthread\\.h$|termios\\.h$)")
+set(server_source "^(CLI/|linux/(filter|landlock|seccomp|tcp)\\.h$|spawn\\.h$|httplib\\.h$|spdlog/|fmt/|prometheus/|openssl/|toml\\+\\+/|toml\\.hpp$|nlohmann/json|zlib\\.h$|sys/|netdb\\.h$|netinet/|arpa/|unistd\\.h$|fcntl\\.h$|signal\\.h$|poll\\.h$|pthread\\.h$|termios\\.h$)")
 
 set(migrations_header "^$")
 set(migrations_source "^$")

@@ -1,8 +1,14 @@
 #include "server/http/http_client.hpp"
 
+#include <unistd.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cerrno>
 #include <cstdlib>
 
 #include "core/base/text.hpp"
+#include "server/http/answer_watch.hpp"
 #include "server/http/text.hpp"
 
 // Last, and never before Eigen: it brings <resolv.h>, whose macro `_res` breaks Eigen's headers.
@@ -40,14 +46,104 @@ std::string& trusted_file() {
   return file;
 }
 
+constexpr std::size_t k_sent_bytes = std::size_t{16} << 10;
+
+/// What comes of a call, piece by piece.
+class Exchange {
+ public:
+  Exchange(const ClientRequest& request, AnswerWatch* watch) : request_(request), watch_(watch) {}
+
+  /// A body is handed on in pieces, so that the time that it takes does not count as the answer's.
+  void send_with(httplib::Request& out) {
+    if (request_.from != nullptr) {
+      std::fseek(request_.from, 0, SEEK_END);
+      out.content_length_ = static_cast<std::size_t>(std::max(0L, std::ftell(request_.from)));
+    } else {
+      out.content_length_ = request_.body.size();
+    }
+    if (out.content_length_ == 0) return;
+    out.headers.emplace("Content-Type", request_.content_type);
+    out.content_provider_ = [this](std::size_t at, std::size_t left, httplib::DataSink& sink) {
+      return piece(at, std::min(left, k_sent_bytes), sink);
+    };
+  }
+
+  void receive_with(httplib::Request& out) {
+    out.response_handler = [this](const httplib::Response& answer) {
+      if (watch_ != nullptr) watch_->begun();
+      response_.status = answer.status;
+      response_.headers.clear();
+      for (const auto& [name, value] : answer.headers) response_.headers[lower(name)] = value;
+      response_.body.clear();
+      into_ = answer.status == 200 ? request_.into : nullptr;
+      if (into_ != nullptr && (std::fflush(into_) != 0 || ::ftruncate(::fileno(into_), 0) != 0)) failed();
+      if (into_ != nullptr) std::rewind(into_);
+      bodiless_ = answer.status == 304;  // the library would wait for a body until the end of the connection
+      return !bodiless_ && !failure_;
+    };
+    out.content_receiver = [this](const char* data, std::size_t n, std::uint64_t, std::uint64_t) {
+      if (watch_ != nullptr) watch_->received(n);
+      bytes_ += n;
+      if (request_.most_bytes && bytes_ > *request_.most_bytes) {
+        failure_ =
+            make_error(Errc::bad_frame, "the answer is longer than the " +
+                                            std::to_string(*request_.most_bytes) + " bytes it may have");
+      } else if (into_ == nullptr) {
+        response_.body.append(data, n);
+      } else if (std::fwrite(data, 1, n, into_) != n) {
+        failed();
+      }
+      return !failure_;
+    };
+  }
+
+  bool bodiless() const { return bodiless_; }
+  /// Of this side.
+  std::optional<Error> failure() {
+    if (!failure_ && into_ != nullptr && std::fflush(into_) != 0) failed();
+    return failure_;
+  }
+  ClientResponse response() && { return std::move(response_); }
+
+ private:
+  bool piece(std::size_t at, std::size_t n, httplib::DataSink& sink) {
+    if (request_.from == nullptr) {
+      (void)sink.write(request_.body.data() + at, n);
+    } else {
+      char buffer[k_sent_bytes];
+      if (std::fseek(request_.from, static_cast<long>(at), SEEK_SET) != 0 ||
+          std::fread(buffer, 1, n, request_.from) != n)
+        failed();
+      if (!failure_) (void)sink.write(buffer, n);
+    }
+    if (watch_ != nullptr) watch_->sent();
+    return !failure_;  // that the link is gone is the library's to say
+  }
+  void failed() {
+    const bool full = errno == ENOSPC || errno == EDQUOT;
+    failure_ = make_error(full ? Errc::storage_full : Errc::storage_unavailable,
+                          full ? "the disk is full" : "cannot read or write a temporary file");
+  }
+
+  const ClientRequest& request_;
+  AnswerWatch* const watch_;
+  ClientResponse response_;
+  std::FILE* into_{nullptr};
+  std::uint64_t bytes_{};
+  bool bodiless_{false};
+  std::optional<Error> failure_;
+};
+
 }  // namespace
 
 struct HttpClient::State {
-  State(std::string at, std::string before)
-      : origin(std::move(at)), prefix(std::move(before)), client(origin) {}
+  State(std::string at, std::string before, std::chrono::milliseconds most)
+      : origin(std::move(at)), prefix(std::move(before)), timeout(most), client(origin) {}
   std::string origin, prefix;
+  std::chrono::milliseconds timeout;
   httplib::Client client;
   httplib::Headers headers;
+  std::atomic<int> socket{-1};
 };
 
 Result<HttpClient> HttpClient::to(std::string_view url, std::chrono::milliseconds timeout) {
@@ -60,7 +156,7 @@ Result<HttpClient> HttpClient::to(std::string_view url, std::chrono::millisecond
   const auto slash = url.find('/', scheme + 3);
   auto prefix = slash == std::string_view::npos ? std::string_view() : url.substr(slash);
   while (prefix.ends_with('/')) prefix.remove_suffix(1);
-  auto state = std::make_unique<State>(std::string(url.substr(0, slash)), std::string(prefix));
+  auto state = std::make_unique<State>(std::string(url.substr(0, slash)), std::string(prefix), timeout);
   if (!state->client.is_valid()) return bad();
   if (word == "https" && !trusted_file().empty()) state->client.set_ca_cert_path(trusted_file().c_str());
   state->client.set_keep_alive(true);
@@ -69,6 +165,10 @@ Result<HttpClient> HttpClient::to(std::string_view url, std::chrono::millisecond
   state->client.set_connection_timeout(std::min<std::chrono::milliseconds>(timeout, std::chrono::seconds(5)));
   state->client.set_read_timeout(timeout);
   state->client.set_write_timeout(timeout);
+  state->client.set_socket_options([state = state.get()](int socket) {
+    httplib::default_socket_options(socket);
+    state->socket = socket;
+  });
   return HttpClient(std::move(state));
 }
 
@@ -85,22 +185,32 @@ void HttpClient::set_header(const std::string& name, const std::string& value) {
 Result<ClientResponse> HttpClient::call(std::string_view method, std::string_view target,
                                         std::string_view body, std::string_view content_type,
                                         const std::map<std::string, std::string>& headers) {
-  httplib::Request request;
-  request.method = method;
-  request.path = state_->prefix + std::string(target);
-  request.headers = state_->headers;
-  for (const auto& [name, value] : headers) request.headers.emplace(name, value);
-  if (!body.empty()) {
-    request.headers.emplace("Content-Type", content_type);
-    request.body = body;
+  return call(
+      {.method = method, .target = target, .body = body, .content_type = content_type, .headers = headers});
+}
+
+Result<ClientResponse> HttpClient::call(const ClientRequest& request) {
+  httplib::Request out;
+  out.method = request.method;
+  out.path = state_->prefix + std::string(request.target);
+  out.headers = state_->headers;
+  for (const auto& [name, value] : request.headers) out.headers.emplace(name, value);
+  std::optional<AnswerWatch> watch;
+  if (request.most_bytes)
+    watch.emplace(state_->socket,
+                  AnswerWatch::Limits{state_->timeout, [client = &state_->client] { client->stop(); }});
+  Exchange exchange(request, watch ? &*watch : nullptr);
+  exchange.send_with(out);
+  exchange.receive_with(out);
+  const auto answer = state_->client.send(out);
+  if (auto failure = exchange.failure()) {
+    failure->message = state_->origin + ": " + failure->message;
+    return *std::move(failure);
   }
-  const auto answer = state_->client.send(request);
-  if (!answer) return make_error(Errc::link_lost, why(answer.error(), state_->origin));
-  ClientResponse response;
-  response.status = answer->status;
-  for (const auto& [name, value] : answer->headers) response.headers[lower(name)] = value;
-  response.body = answer->body;
-  return response;
+  if (watch && !watch->why().empty()) return make_error(Errc::link_lost, state_->origin + " " + watch->why());
+  if (!answer && !exchange.bodiless())
+    return make_error(Errc::link_lost, why(answer.error(), state_->origin));
+  return std::move(exchange).response();
 }
 
 }  // namespace anchord::server

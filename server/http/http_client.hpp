@@ -1,8 +1,11 @@
 #pragma once
 
 #include <chrono>
+#include <cstdint>
+#include <cstdio>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -14,6 +17,19 @@ struct ClientResponse {
   int status{};
   std::map<std::string, std::string> headers;  ///< names lower case
   std::string body;
+};
+
+/// A call whose body or answer is too large to hold, or that a stranger may answer.
+struct ClientRequest {
+  std::string_view method, target;
+  std::string_view body{};
+  std::string_view content_type{"application/json"};
+  std::map<std::string, std::string> headers{};
+  std::FILE* from{nullptr};  ///< all of it is the body
+  std::FILE* into{nullptr};  ///< becomes the body of a 200
+  /// Of the answer, unpacked. With it the answer must also begin within the time-out after the last byte of
+  /// the request, and then come with some speed.
+  std::optional<std::uint64_t> most_bytes{};
 };
 
 /// A blocking HTTP client for our own commands and tests: one connection, kept alive. No redirects, no
@@ -37,6 +53,9 @@ class HttpClient {
   Result<ClientResponse> call(std::string_view method, std::string_view target, std::string_view body = {},
                               std::string_view content_type = "application/json",
                               const std::map<std::string, std::string>& headers = {});
+  /// errors: as above (also too slow); bad_frame (longer than it may be), storage_full and
+  /// storage_unavailable (of the files)
+  Result<ClientResponse> call(const ClientRequest& request);
 
  private:
   struct State;
