@@ -170,6 +170,7 @@ class Reader {
 
   /// Of a site: every server edits these, so none depends on another being new.
   Result<BundleOutcome> run_site(const SiteId& site) {
+    of_site_ = site;
     for (const auto& spec : site_bundle_specs()) {
       BOOST_OUTCOME_TRY(take(spec));
     }
@@ -259,6 +260,9 @@ class Reader {
       BOOST_OUTCOME_TRY(const bool more, source_.next(row));
       if (!more) break;
       ++counted.n_rows;
+      if (of_site_) {
+        BOOST_OUTCOME_TRYV(check_site(spec, row));
+      }
       if (skipped(spec, row)) continue;
       BOOST_OUTCOME_TRY(const bool added, take_row(spec, row));
       if (added) ++counted.n_added;
@@ -312,6 +316,28 @@ class Reader {
     if (spec.table.name == "kit_profile") return profiles_out_.contains(row[0]);
     if (spec.table.name == "anchor_external_id") return anchors_out_.contains(row[0]);
     return spec.part == BundlePart::calibration && calibrations_out_.contains(uuid_of(row[0]));
+  }
+
+  /// Of a site's bundle: whether the row is of that site, by itself or by what the bundle has before it.
+  Result<void> check_site(const BundleSpec& spec, const BundleRow& row) {
+    const auto cell = [&](std::string_view name) -> const BundleCell* {
+      const auto at = std::ranges::find(spec.columns, name, &BundleColumnSql::bundle);
+      return at == spec.columns.end() ? nullptr : &row[static_cast<std::size_t>(at - spec.columns.begin())];
+    };
+    const BundleCell* const site = spec.table.name == "site" ? row.data() : cell("site_id");
+    const BundleCell* const building = cell("building_id");
+    const BundleCell* const above = building != nullptr ? building : cell("anchor_id");
+    bool theirs =
+        site != nullptr ? uuid_of(*site) == of_site_->uuid : above == nullptr || named_.contains(*above);
+    if (spec.table.name == "building") {  // the bundle's floors come below the one that is here
+      const auto here = stored(spec, row);
+      theirs = theirs && (!here || uuid_of((*here)[1]) == of_site_->uuid);
+    }
+    if (!theirs)
+      return make_error(Errc::invalid_argument, "the bundle is of site " + to_string(*of_site_) + ", but " +
+                                                    name_of(spec, row) + " is of another one");
+    if (site != nullptr) named_.insert(row[0]);
+    return boost::outcome_v2::success();
   }
 
   Result<bool> take_row(const BundleSpec& spec, const BundleRow& row) {
@@ -472,6 +498,8 @@ class Reader {
   std::set<BundleCell> profiles_out_, anchors_out_;  ///< kits by name, anchors by the id of the bundle
   std::set<BundleCell> places_added_;                ///< floors and pictures
   std::map<SiteId, SiteCounts> added_;
+  std::optional<SiteId> of_site_;
+  std::set<BundleCell> named_;  ///< of a site's bundle: ids of its rows, here before or not
   BundleOutcome out_;
 };
 

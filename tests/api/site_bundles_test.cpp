@@ -139,6 +139,9 @@ TEST_F(Bundles, OfASiteAreRefusedWholeWhereAnyPartIsNotWhatItSays) {
   std::string& rows = content(other_site, "tables/site.ndjson");
   rows.replace(rows.find(to_string(site)), 36, "01a211df-8b78-77ea-8dc4-df6596c7fea9");
   say_site_again(other_site);
+  refused(other_site, "is of another one");
+  rows.erase(rows.find('\n') + 1);  // but the names of the columns
+  say_site_again(other_site);
   refused(other_site, "no row of its site");
 }
 

@@ -131,6 +131,54 @@ TEST_P(SiteBundleContract, LeavesAFloorThatWasEditedHereWithItsOwnPictures) {
   EXPECT_FALSE(stays.tiles);
 }
 
+/// Cells of ids stand where the columns of the table have them.
+BundleCell& cell_of(BundleStore& store, BundleRows& rows, const std::string& table,
+                    const std::string& column) {
+  const auto& all = store.site_tables();
+  const auto& columns = std::ranges::find(all, table, &BundleTable::name)->columns;
+  const auto at = std::ranges::find(columns, column, &BundleColumn::name) - columns.begin();
+  return rows.tables.at(table).at(0).at(static_cast<std::size_t>(at));
+}
+BundleCell cell(const Uuid& id) {
+  return std::string(reinterpret_cast<const char*>(id.bytes.data()), id.bytes.size());
+}
+
+TEST_P(SiteBundleContract, RefusesAsAWholeWhatIsOfAnotherSite) {
+  const auto place = drawn();
+  const BundleRows rows = written(*db_, place.site.id);
+  ScratchDir folder;
+  const auto other = open_sqlite(folder.path() / "data");
+  auto& stores = other->stores();
+  Site theirs;
+  theirs.id = SiteId{make_uuid_v7(k_noon)};
+  theirs.name = "of somebody else";
+  ASSERT_TRUE(stores.sites.insert(theirs));
+  Building house;
+  house.id = BuildingId{make_uuid_v7(k_noon)};
+  house.site = theirs.id;
+  house.name = "theirs";
+  house.created = k_noon;
+  ASSERT_TRUE(stores.places.insert(house));
+  BundleRows site = rows, building = rows, floor = rows, taken_over = rows;
+  cell_of(stores.bundles, site, "site", "id") = cell(SiteId{make_uuid_v7(k_noon)}.uuid);
+  cell_of(stores.bundles, building, "building", "site_id") = cell(theirs.id.uuid);
+  cell_of(stores.bundles, floor, "building_floor", "building_id") = cell(house.id.uuid);
+  // Says that the building is of the bundle's site.
+  cell_of(stores.bundles, taken_over, "building", "id") = cell(house.id.uuid);
+  cell_of(stores.bundles, taken_over, "building_floor", "building_id") = cell(house.id.uuid);
+  for (BundleRows* forged : {&site, &building, &floor, &taken_over}) {
+    const auto refused = stores.bundles.take_site(place.site.id, *forged);
+    ASSERT_FALSE(refused);
+    EXPECT_EQ(refused.error().code, Errc::invalid_argument);
+    EXPECT_THAT(refused.error().message, HasSubstr("is of another one"));
+    EXPECT_FALSE(stores.sites.site(place.site.id)) << "nothing of it was taken";
+    EXPECT_EQ(stores.places.buildings(10, {}, theirs.id).value().size(), 1u);
+    EXPECT_FALSE(stores.places.floor(place.floor.id));
+  }
+  BundleRows whole = rows;
+  EXPECT_TRUE(stores.bundles.take_site(place.site.id, whole));
+}
+
 INSTANTIATE_TEST_SUITE_P(Backends, SiteBundleContract, backends(), backend_name);
 
 }  // namespace
