@@ -8,6 +8,7 @@
 #include "api/bundles/routes.hpp"
 #include "api/bundles/site_bundle.hpp"
 #include "api/bundles/spool.hpp"
+#include "api/kit/content_tag.hpp"
 #include "api/kit/reader.hpp"
 #include "api/kit/support.hpp"
 #include "core/base/text.hpp"
@@ -34,9 +35,16 @@ Response site_bundle(BundleApi& s, const Request& request) {
                   {{"/flights", "wrong_type", "must be true or false"}});
   const Site site = value_or_problem(s.sites.site(path_id<SiteId>(request)));
   auto folder = value_or_problem(SpoolFolder::make(s.spool));
-  const auto file =
+  const auto made =
       value_or_problem(make_site_bundle(s, site, request.principal, *folder, flights == "true"));
-  return file_answer(std::move(folder), file, k_site_bundle_type, "site-" + to_string(site.id) + ".anchord");
+  const std::string etag = "\"sha256:" + made.digest + '"';
+  Response response;
+  response.status = 304;
+  if (!etag_listed(request.header("if-none-match"), etag))
+    response = file_answer(std::move(folder), made.file, k_site_bundle_type,
+                           "site-" + to_string(site.id) + ".anchord");
+  response.header("ETag", etag);
+  return response;
 }
 
 Response ranges_file(BundleApi& s, const Request& request) {

@@ -98,8 +98,8 @@ bool SiteImport::added() const {
          });
 }
 
-Result<std::filesystem::path> make_site_bundle(BundleApi& api, const Site& site, const Principal& who,
-                                               const SpoolFolder& folder, bool with_flights) {
+Result<SiteBundle> make_site_bundle(BundleApi& api, const Site& site, const Principal& who,
+                                    const SpoolFolder& folder, bool with_flights) {
   SiteManifest manifest{site.id, site.name, api.made_by, api.clock.now(), {}, {}};
   FolderSink sink(folder, manifest.entries);
   BOOST_OUTCOME_TRY(api.bundles.write_site(site.id, sink));
@@ -145,7 +145,7 @@ Result<std::filesystem::path> make_site_bundle(BundleApi& api, const Site& site,
     BOOST_OUTCOME_TRYV(zip.add_file(manifest.entries[n_tables + i].name, files[i], true));
   }
   BOOST_OUTCOME_TRYV(zip.finish());
-  return file;
+  return SiteBundle{file, site_bundle_digest(manifest)};
 }
 
 Result<SiteImport> take_site_bundle(BundleApi& api, const Request& request, const ZipReader& zip,

@@ -17,11 +17,15 @@ namespace anchord::api {
 
 class SpoolFolder;
 
-/// Everything of a site in one file in the folder, or all but its flights; its path. Flights that record are
-/// left out and named.
+struct SiteBundle {
+  std::filesystem::path file;
+  std::string digest;  ///< as its manifest has it
+};
+/// Everything of a site in one file in the folder, or all but its flights. Flights that record are left out
+/// and named.
 /// errors: those of make_bundle; unsupported (more than a bundle may have)
-Result<std::filesystem::path> make_site_bundle(BundleApi& api, const Site& site, const Principal& who,
-                                               const SpoolFolder& folder, bool with_flights);
+Result<SiteBundle> make_site_bundle(BundleApi& api, const Site& site, const Principal& who,
+                                    const SpoolFolder& folder, bool with_flights);
 
 /// What became of a site's bundle: of its own rows, and of each flight.
 struct SiteImport {
