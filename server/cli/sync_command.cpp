@@ -15,10 +15,11 @@ namespace {
 constexpr int k_undecided = 3;  ///< a person has to decide whose positions hold
 
 struct Options {
-  std::string to, token_file, data_dir{"anchord-data"}, url, url_token_file;
-  std::vector<std::string> keep;
+  std::string to, from, token_file, data_dir{"anchord-data"}, url, url_token_file, reason;
+  std::vector<std::string> keep, sites;
   int wait_s{60};
-  bool dry_run{false};
+  bool dry_run{false}, activate_models{false};
+  bool down() const { return !from.empty(); }
 };
 
 int fail(const std::string& message, int code) {
@@ -55,13 +56,25 @@ void print(const sync::Conflict& conflict) {
   }
 }
 
-void print(const sync::Outcome& o, bool dry_run) {
-  if (!dry_run)
-    std::printf(
-        "flights: %llu sent, %llu already there, %llu not finished\nmodels: %llu sent, %llu already "
-        "there\nanchors: %llu published, %llu already there, %llu left as published there\n",
-        n(o.flights_sent), n(o.flights_there), n(o.flights_recording), n(o.models_sent), n(o.models_there),
-        n(o.anchors_published), n(o.anchors_there), n(o.anchors_left));
+void print_counts(const sync::Outcome& o, bool down) {
+  const char* const sent = down ? "taken" : "sent";
+  const char* const there = down ? "here" : "there";
+  if (down) std::printf("sites: %llu %s, %llu already %s\n", n(o.sites_sent), sent, n(o.sites_there), there);
+  if (down)
+    std::printf("flights: %llu taken\n", n(o.flights_sent));
+  else
+    std::printf("flights: %llu sent, %llu already there, %llu not finished\n", n(o.flights_sent),
+                n(o.flights_there), n(o.flights_recording));
+  std::printf("models: %llu %s, %llu already %s\n", n(o.models_sent), sent, n(o.models_there), there);
+  std::printf("profiles of kits: %llu %s, %llu already %s\n", n(o.profiles_sent), sent, n(o.profiles_there),
+              there);
+  std::printf("anchors: %llu published, %llu already %s, %llu left as published %s\n", n(o.anchors_published),
+              n(o.anchors_there), there, n(o.anchors_left), there);
+}
+
+void print(const sync::Outcome& o, bool down, bool dry_run) {
+  if (!dry_run) print_counts(o, down);
+  for (const auto& one : o.differs) std::printf("differs: %s\n", printable(one).c_str());
   for (const auto& conflict : o.undecided) print(conflict);
   if (!o.undecided.empty())
     std::printf(
@@ -86,31 +99,39 @@ Result<sync::Outcome> run(const Options& options, const sync::Decisions& decisio
   peer.report = [](const std::string& line) { std::fprintf(stderr, "%s\n", printable(line).c_str()); };
   peer.url = *local;
   peer.token_option = "--url-token-file";
+  peer.role = options.down() ? "engineer" : "viewer";
   BOOST_OUTCOME_TRY(peer.token, field_token(options));
   BOOST_OUTCOME_TRY(const auto field, sync::Peer::to(peer));
-  peer.url = options.to;
+  peer.url = options.down() ? options.from : options.to;
   peer.token_option = "--token-file";
+  peer.role = options.down() ? "viewer" : "engineer";
   BOOST_OUTCOME_TRY(peer.token, read_token_file(options.token_file));
   BOOST_OUTCOME_TRY(const auto centre, sync::Peer::to(peer));
   sync::SyncOptions how;
+  how.direction = options.down() ? sync::Direction::down : sync::Direction::up;
+  how.sites = options.sites;
+  how.activate_models = options.activate_models;
+  how.reason = options.reason;
   how.dry_run = options.dry_run;
   how.decisions = decisions;
   how.state_file = std::filesystem::path(options.data_dir) / "sync.json";
   how.report = peer.report;
-  return sync::sync_up(*field, *centre, how);
+  return sync::sync(*field, *centre, how);
 }
 
 int sync_command(const Options& options) {
+  if (options.to.empty() && options.from.empty())
+    return fail("give the centre with --to (after the trip) or --from (before it)", 2);
   const auto decisions = decisions_of(options.keep);
   if (!decisions) return fail(decisions.error().message, 2);
   const auto outcome = run(options, decisions.value());
   if (!outcome) {
     const bool input = outcome.error().code == Errc::invalid_argument;
     return fail(outcome.error().message +
-                    (input ? "" : "; what has been sent stays, run the command again to continue"),
+                    (input ? "" : "; what has arrived stays, run the command again to continue"),
                 input ? 2 : 1);
   }
-  print(outcome.value(), options.dry_run);
+  print(outcome.value(), options.down(), options.dry_run);
   if (!outcome.value().failed.empty()) return 1;
   return outcome.value().undecided.empty() ? 0 : k_undecided;
 }
@@ -119,24 +140,46 @@ int sync_command(const Options& options) {
 
 void add_sync_command(CLI::App& app, int& exit_code) {
   auto* command = app.add_subcommand(
-      "sync", "Send finished flights, models and published positions of a running server to another");
+      "sync", "Send the work of a running field server to the centre, or take from there what a trip needs");
   const auto options = std::make_shared<Options>();
-  command->add_option("--to", options->to, "address of the centre, like https://centre.example")->required();
-  command->add_option("--token-file", options->token_file,
-                      "file with an access token of the centre (role engineer); else ANCHORD_TOKEN");
+  auto* to = command->add_option(
+      "--to", options->to,
+      "send finished flights, models and published positions to this centre, like https://centre.example");
+  auto* from =
+      command
+          ->add_option("--from", options->from,
+                       "take sites, plans, published positions, models and profiles from this centre")
+          ->excludes(to);
+  command->add_option(
+      "--token-file", options->token_file,
+      "file with an access token of the centre (role engineer; with --from viewer is enough); "
+      "else ANCHORD_TOKEN");
   command
       ->add_option("--data-dir", options->data_dir, "data folder of the running field server [anchord-data]")
       ->envname("ANCHORD_DATA_DIR");
   command->add_option("--url", options->url, "address of the field server [that of its data folder]");
   command->add_option("--url-token-file", options->url_token_file,
                       "file with an access token of the field server [the admin token of its data folder]");
+  command->add_option("--site", options->sites, "with --from: only this site, by name or id; may be repeated")
+      ->allow_extra_args(false)
+      ->needs(from);
+  auto* activate =
+      command
+          ->add_flag("--activate-models", options->activate_models,
+                     "with --from: models that are active at the centre become active here, if the gate "
+                     "here passes them")
+          ->needs(from);
+  command
+      ->add_option("--reason", options->reason,
+                   "with --activate-models: why, where the gate does not pass one; kept with the promotion")
+      ->needs(activate);
   command
       ->add_option("--keep", options->keep,
                    "where both have published: field or centre, or SITE=field for one site; may be repeated")
       ->allow_extra_args(false);
   command->add_option("--wait", options->wait_s, "seconds to wait for a server that does not answer [60]")
       ->check(CLI::Range(1, 86'400));
-  command->add_flag("--dry-run", options->dry_run, "show what would be sent, send nothing");
+  command->add_flag("--dry-run", options->dry_run, "show what would be sent or taken, change nothing");
   command->callback([&exit_code, options] { exit_code = sync_command(*options); });
 }
 

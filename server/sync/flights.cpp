@@ -7,6 +7,7 @@
 #include "api/formats/bundle.hpp"
 #include "core/base/sha256.hpp"
 #include "server/sync/peer.hpp"
+#include "server/sync/spool.hpp"
 #include "server/sync/sync.hpp"
 #include "server/sync/taken.hpp"
 
@@ -22,40 +23,26 @@ constexpr std::array<std::string_view, 8> k_own_tables{
     "fix",     "exclusion",   "exclusion_row",     "exclusion_taken_back"};
 
 struct Bundle {
-  std::string digest;      ///< of all of it, as the centre names it
+  Spool file;
+  std::string digest;      ///< of all of it, as who takes it names it
   std::string own_digest;  ///< of the flight's own tables
-  std::string bytes;
 };
-
-Result<Bundle> read_bundle(std::string bytes) {
-  BOOST_OUTCOME_TRY(const auto text, manifest_of(bytes));
-  BOOST_OUTCOME_TRY(const auto manifest, api::read_bundle_manifest(text));
-  Sha256 own;
-  for (const auto& entry : manifest.entries) {
-    for (const auto table : k_own_tables)
-      if (entry.name == api::bundle_entry_name(BundleTable{std::string(table), {}}))
-        own.add(entry.name + ' ' + entry.sha256_hex + '\n');
-  }
-  return Bundle{api::bundle_digest(manifest), own.hex(), std::move(bytes)};
-}
 
 class Flights {
  public:
-  Flights(Peer& field, Peer& centre, const SyncOptions& options, Outcome& outcome)
-      : field_(field),
-        centre_(centre),
-        options_(options),
-        out_(outcome),
-        taken_(options.state_file, centre.url()) {}
+  Flights(Run& run, const std::set<std::string>* calibrations)
+      : run_(run), only_(calibrations), taken_(run.options.state_file, run.centre.url()) {}
 
-  Result<void> run() {
-    BOOST_OUTCOME_TRY(auto missions, field_.list("/api/v1/missions?fields=id,name,state"));
+  Result<void> send_all() {
+    if (only_ != nullptr && only_->empty()) return boost::outcome_v2::success();
+    BOOST_OUTCOME_TRY(auto missions, run_.source().list("/api/v1/missions?fields=id,name,state"));
     std::ranges::reverse(missions);  // oldest first: revisions rest on those before them
     std::set<std::string> finished;
     for (const auto& mission : missions)
       if (text_of(mission, "state") == "finished") finished.insert(text_of(mission, "id"));
     BOOST_OUTCOME_TRYV(compare_calibrations(finished));
     for (const auto& mission : missions) {
+      if (only_ != nullptr) break;
       if (finished.contains(text_of(mission, "id"))) {
         BOOST_OUTCOME_TRYV(send(mission));
       } else {
@@ -69,116 +56,153 @@ class Flights {
       taken_.forget(id);
       BOOST_OUTCOME_TRYV(send(mission));
     }
-    for (const auto& [id, sent] : sent_) ++(sent ? out_.flights_sent : out_.flights_there);
+    for (const auto& [id, sent] : sent_) ++(sent ? run_.outcome.flights_sent : run_.outcome.flights_there);
     return boost::outcome_v2::success();
   }
 
  private:
-  /// Calibrations that are not at the centre, and whose flights can all be there.
+  /// Calibrations that are not at the target, and whose flights can all be there.
   Result<void> compare_calibrations(const std::set<std::string>& finished) {
-    BOOST_OUTCOME_TRY(const auto ours, field_.list("/api/v1/calibrations?fields=id,missions"));
-    BOOST_OUTCOME_TRY(const auto known, centre_.list("/api/v1/calibrations?fields=id"));
+    BOOST_OUTCOME_TRY(const auto ours, run_.source().list("/api/v1/calibrations?fields=id,missions"));
+    BOOST_OUTCOME_TRY(const auto known, run_.target().list("/api/v1/calibrations?fields=id"));
     std::set<std::string> there;
     for (const auto& calibration : known) there.insert(text_of(calibration, "id"));
     for (const auto& calibration : ours) {
       const auto id = text_of(calibration, "id");
-      if (there.contains(id)) continue;
+      if (there.contains(id) || (only_ != nullptr && !only_->contains(id))) continue;
       std::set<std::string> of;
       for (const auto& mission : member(calibration, "missions"))
         if (mission.is_string()) of.insert(mission.get<std::string>());
-      if (std::ranges::includes(finished, of)) missing_[id] = std::move(of);
+      if (std::ranges::includes(finished, of))
+        missing_[id] = std::move(of);
+      else if (only_ != nullptr)
+        run_.report("calibration " + id +
+                    " rests on a flight that is not finished: it comes with a later run");
     }
     return boost::outcome_v2::success();
   }
 
   void later(const Json& mission) {
-    ++out_.flights_recording;
-    options_.report("flight \"" + text_of(mission, "name") + "\" is not finished: it is sent by a later run");
+    ++run_.outcome.flights_recording;
+    run_.report("flight \"" + text_of(mission, "name") + "\" is not finished: it is sent by a later run");
   }
 
   bool has_missing_calibration(const std::string& mission) const {
     return std::ranges::any_of(missing_, [&](const auto& one) { return one.second.contains(mission); });
   }
+  void brought(const std::string& mission, const std::set<std::string>& left_out) {
+    std::erase_if(missing_, [&](const auto& one) {
+      return one.second.contains(mission) && !left_out.contains("calibration " + one.first);
+    });
+  }
+
+  /// Of the bundle in the file, which must be of this flight.
+  Result<Bundle> read_bundle(const std::string& id, const std::string& target, Spool file) const {
+    const auto text = manifest_of(file);
+    if (!text) return run_.source().stranger(target, text.error().message);
+    const auto manifest = api::read_bundle_manifest(text.value());
+    if (!manifest) return run_.source().stranger(target, manifest.error().message);
+    if (to_string(manifest.value().mission) != id)
+      return run_.source().stranger(
+          target, "the bundle is of another flight, " + to_string(manifest.value().mission));
+    Sha256 own;
+    for (const auto& entry : manifest.value().entries) {
+      for (const auto table : k_own_tables)
+        if (entry.name == api::bundle_entry_name(BundleTable{std::string(table), {}}))
+          own.add(entry.name + ' ' + entry.sha256_hex + '\n');
+    }
+    return Bundle{std::move(file), api::bundle_digest(manifest.value()), own.hex()};
+  }
 
   Result<void> send(const Json& mission) {
     const auto id = text_of(mission, "id"), name = "flight \"" + text_of(mission, "name") + '"';
-    BOOST_OUTCOME_TRY(
-        auto made,
-        field_.call({.method = "GET", .target = "/api/v1/missions/" + id + "/bundle", .bundle = true}));
+    if (!run_.up() && run_.options.dry_run) {
+      tried_.insert(id);
+      brought(id, {});
+      run_.report(name + ": would be taken");
+      return boost::outcome_v2::success();
+    }
+    const auto target = path_of("missions", id, "/bundle");
+    BOOST_OUTCOME_TRY(auto file, Spool::make(run_.options.state_file.parent_path()));
+    BOOST_OUTCOME_TRY(const auto made, run_.source().call({.method = "GET",
+                                                           .target = target,
+                                                           .into = &file,
+                                                           .most_bytes = k_most_bundle_bytes,
+                                                           .bundle = true}));
     if (made.status != 200) return failed(name, made);
-    BOOST_OUTCOME_TRY(const auto bundle, read_bundle(std::move(made.body)));
+    BOOST_OUTCOME_TRY(const auto bundle, read_bundle(id, target, std::move(file)));
     if (taken_.has(id, bundle.own_digest)) {
       // It may have been removed there since, or the centre be another one at the same address.
-      BOOST_OUTCOME_TRY(const auto there, centre_.call({"GET", "/api/v1/missions/" + id}));
+      BOOST_OUTCOME_TRY(const auto there, run_.target().call({"GET", path_of("missions", id)}));
       if (there.status == 200) {
         sent_.emplace(id, false);
         return boost::outcome_v2::success();
       }
     }
     tried_.insert(id);
-    if (options_.dry_run) {
-      std::erase_if(missing_, [&](const auto& one) { return one.second.contains(id); });
-      options_.report(name + ": would send " + megabytes(bundle.bytes.size()));
+    const auto size = megabytes(bundle.file.bytes());
+    if (run_.options.dry_run) {
+      brought(id, {});
+      run_.report(name + ": would send " + size);
       return boost::outcome_v2::success();
     }
-    options_.report(name + ": " + megabytes(bundle.bytes.size()));
-    BOOST_OUTCOME_TRY(const auto answer, centre_.call({.method = "POST",
-                                                       .target = "/api/v1/bundles",
-                                                       .body = bundle.bytes,
-                                                       .type = api::k_bundle_type,
-                                                       .bundle = true}));
+    run_.report(name + ": " + size);
+    BOOST_OUTCOME_TRY(const auto answer, run_.target().call({.method = "POST",
+                                                             .target = "/api/v1/bundles",
+                                                             .type = api::k_bundle_type,
+                                                             .from = &bundle.file,
+                                                             .bundle = true}));
     if (answer.status == 404 || answer.status == 405)
-      return make_error(Errc::unsupported, centre_.url() + " does not accept flight bundles (" +
-                                               in_words(answer) +
+      return make_error(Errc::unsupported, run_.target().url() + " does not accept flight bundles (" +
+                                               sync::in_words(answer) +
                                                "): it is older than this program, update it");
     if (answer.status != 200 && answer.status != 201) return failed(name, answer);
-    return arrived(id, name, bundle, Json::parse(answer.body, nullptr, false));
+    return arrived(id, name, bundle, json_of(answer));
   }
 
   Result<void> arrived(const std::string& id, const std::string& name, const Bundle& bundle,
                        const Json& answer) {
     if (text_of(answer, "mission") != id || text_of(answer, "digest") != "sha256:" + bundle.digest)
-      return centre_.stranger("POST /api/v1/bundles",
-                              "the answer does not belong to the bundle that was sent");
+      return run_.target().stranger("POST /api/v1/bundles",
+                                    "the answer does not belong to the bundle that was sent");
     std::set<std::string> left_out;
     for (const auto& left : member(answer, "left_out")) {
       const auto what = text_of(left, "what");
-      if (what.starts_with("revision ")) continue;  // positions are compared one by one, after the flights
+      // Positions and profiles of kits are compared one by one, after the flights.
+      if (what.starts_with("revision ") || what.starts_with("kit_profile ")) continue;
       left_out.insert(what);
-      options_.report(name + ": " + what + " left out: " + text_of(left, "why"));
+      // Comes with the other flight that it rests on, or was not asked for.
+      if (only_ != nullptr && what.starts_with("calibration ")) continue;
+      run_.left_out(name, what, text_of(left, "why"));
     }
-    std::erase_if(missing_, [&](const auto& one) {
-      return one.second.contains(id) && !left_out.contains("calibration " + one.first);
-    });
+    brought(id, left_out);
     std::uint64_t rows = 0;
     for (const auto& n : member(answer, "added")) rows += n.is_number_unsigned() ? n.get<std::uint64_t>() : 0;
     sent_[id] = sent_[id] || rows > 0;
-    options_.report(name + ": " +
-                    (rows > 0 ? std::to_string(rows) + " rows stored" : std::string("already there")));
+    run_.report(name + ": " +
+                (rows > 0 ? std::to_string(rows) + " rows stored" : std::string("already there")));
     if (const auto noted = taken_.note(id, bundle.own_digest); !noted)
-      options_.report(noted.error().message + "; the next run sends this flight again");
+      run_.report(noted.error().message + "; the next run sends this flight again");
     return boost::outcome_v2::success();
   }
 
   Result<void> failed(const std::string& name, const server::ClientResponse& answer) {
-    refused(out_, options_, name + ": " + in_words(answer));
+    run_.failed(name + ": " + sync::in_words(answer));
     return boost::outcome_v2::success();
   }
 
-  Peer& field_;
-  Peer& centre_;
-  const SyncOptions& options_;
-  Outcome& out_;
+  Run& run_;
+  const std::set<std::string>* const only_;
   Taken taken_;
   std::set<std::string> tried_;       ///< flights whose bundle was sent in this run, or would be
   std::map<std::string, bool> sent_;  ///< flights that are there: whether something of them came now
-  std::map<std::string, std::set<std::string>> missing_;  ///< calibrations not at the centre: their flights
+  std::map<std::string, std::set<std::string>> missing_;  ///< calibrations not at the target: their flights
 };
 
 }  // namespace
 
-Result<void> send_flights(Peer& field, Peer& centre, const SyncOptions& options, Outcome& outcome) {
-  return Flights(field, centre, options, outcome).run();
+Result<void> send_flights(Run& run, const std::set<std::string>* calibrations) {
+  return Flights(run, calibrations).send_all();
 }
 
 }  // namespace anchord::sync

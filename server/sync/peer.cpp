@@ -4,11 +4,14 @@
 #include <random>
 #include <thread>
 
+#include "api/kit/reader.hpp"
 #include "api/kit/support.hpp"
 #include "api/measurements/flight_requests.hpp"
 #include "core/base/text.hpp"
 #include "core/base/time.hpp"
+#include "core/base/to_wire.hpp"
 #include "server/gateway/answer.hpp"
+#include "server/sync/spool.hpp"
 
 namespace anchord::sync {
 namespace {
@@ -21,7 +24,10 @@ constexpr milliseconds k_answer_time{30'000};
 /// Five million rows, the most of a bundle, are taken in within some minutes.
 constexpr milliseconds k_bundle_answer_time{600'000};
 constexpr milliseconds k_first_pause{500}, k_longest_pause{15'000};
-constexpr int k_most_pages = 10'000;  ///< ten million items: more than any server has
+constexpr int k_most_long_attempts = 5;
+constexpr std::size_t k_page = 500;
+constexpr int k_most_pages = 10'000;  ///< five million items: more than any server has
+constexpr std::size_t k_most_kept_bytes = std::size_t{64} << 20;
 
 Errc errc_of(int status) {
   if (status == 404 || status == 410) return Errc::not_found;
@@ -44,6 +50,16 @@ std::string text_of(const Json& object, const char* key) {
   return value.is_string() ? value.get<std::string>() : std::string();
 }
 
+Json json_of(const server::ClientResponse& answer) {
+  Json json;
+  if (api::parse_json(answer.body, json)) return {};
+  return json;
+}
+
+std::string path_of(std::string_view kind, std::string_view id, std::string_view rest) {
+  return "/api/v1/" + std::string(kind) + '/' + api::percent_encoded(id) + std::string(rest);
+}
+
 std::string in_words(const server::ClientResponse& answer) {
   return std::to_string(answer.status) + " " + api::problem_text(answer.body);
 }
@@ -58,25 +74,39 @@ Result<std::unique_ptr<Peer>> Peer::to(const PeerOptions& options) {
   return std::unique_ptr<Peer>(new Peer(options, std::move(quick), std::move(slow)));
 }
 
+Result<server::ClientResponse> Peer::once(const PeerRequest& request) {
+  auto answer = (request.bundle ? slow_ : quick_)
+                    .call(server::ClientRequest{.method = request.method,
+                                                .target = request.target,
+                                                .body = request.body,
+                                                .content_type = request.type,
+                                                .headers = request.headers,
+                                                .from = request.from ? request.from->file() : nullptr,
+                                                .into = request.into ? request.into->file() : nullptr,
+                                                .most_bytes = request.most_bytes});
+  if (!answer && answer.error().code == Errc::bad_frame)
+    return stranger(request.target, answer.error().message);
+  return answer;
+}
+
 Result<server::ClientResponse> Peer::call(const PeerRequest& request) {
   static std::minstd_rand chance{std::random_device{}()};
   gateway::Pauses pauses{k_first_pause, k_longest_pause};
   const std::string what = options_.url + " " + std::string(request.method) + " " + request.target + ": ";
-  std::map<std::string, std::string> headers;
-  if (!request.idempotency_key.empty()) headers.emplace("Idempotency-Key", request.idempotency_key);
   std::optional<Monotonic::time_point> away_since;
+  int long_attempts = 0;
   for (;;) {
     const auto began = Monotonic::now();
-    auto answer = (request.bundle ? slow_ : quick_)
-                      .call(request.method, request.target, request.body, request.type, headers);
+    auto answer = once(request);
+    if (!answer && answer.error().code != Errc::link_lost) return answer;
     auto wait = pauses.next(std::uniform_real_distribution<double>(0, 1)(chance));
     std::string why = answer ? what + in_words(answer.value()) : answer.error().message;
     if (answer) {
       const auto& a = answer.value();
       if (a.status == 401 || a.status == 403)
-        return make_error(Errc::invalid_argument,
-                          why + "; " + options_.token_option +
-                              " must give a file with a token of that server (role engineer)");
+        return make_error(Errc::invalid_argument, why + "; " + options_.token_option +
+                                                      " must give a file with a token of that server (role " +
+                                                      options_.role + ")");
       if (a.status == 507)
         return make_error(
             Errc::storage_full,
@@ -85,9 +115,11 @@ Result<server::ClientResponse> Peer::call(const PeerRequest& request) {
       if (const auto header = a.headers.find("retry-after"); header != a.headers.end())
         wait = std::max(wait, gateway::retry_after(header->second, SystemClock{}.now()).value_or(wait));
     }
-    // A large bundle that was on its way for long had a link: only the time without one counts.
+    // A large bundle that was on its way for long had a link: only the time without one counts. A server that
+    // never answers at all looks the same, so that there is an end to it.
     const auto now = Monotonic::now();
-    if (!away_since || now - began > options_.give_up) {
+    const bool had_link = now - began > options_.give_up && ++long_attempts <= k_most_long_attempts;
+    if (!away_since || had_link) {
       away_since = now;
       options_.report(why + "; trying again for " + std::to_string(options_.give_up.count()) + " s");
     }
@@ -105,28 +137,44 @@ Result<Json> Peer::get(const std::string& target) {
   BOOST_OUTCOME_TRY(const auto answer, call({"GET", target}));
   if (answer.status >= 300)
     return make_error(errc_of(answer.status), options_.url + " GET " + target + ": " + in_words(answer));
-  auto json = Json::parse(answer.body, nullptr, false);
+  auto json = json_of(answer);
   if (!json.is_object()) return stranger(target, "the answer is not a JSON object");
   return json;
 }
 
-Result<std::vector<Json>> Peer::list(const std::string& target) {
-  std::vector<Json> out;
-  const std::string first = target + (target.find('?') == std::string::npos ? "?" : "&") + "limit=1000";
+Result<void> Peer::each(const std::string& target,
+                        const std::function<Result<void>(const Json& item)>& take) {
+  const std::string first =
+      target + (target.find('?') == std::string::npos ? "?" : "&") + "limit=" + std::to_string(k_page);
   std::string cursor;
   for (int pages = 0; pages < k_most_pages; ++pages) {
     BOOST_OUTCOME_TRY(const auto page,
                       get(cursor.empty() ? first : first + "&cursor=" + api::percent_encoded(cursor)));
     const Json& items = page.contains("items") ? page["items"] : member(page, "features");
     if (!items.is_array()) return stranger(target, "the answer is not a list");
+    if (items.size() > k_page)
+      return stranger(target, "a page of the list has more items than were asked for");
     for (const auto& item : items) {
       if (!item.is_object()) return stranger(target, "an item of the list is not a JSON object");
-      out.push_back(item);
+      BOOST_OUTCOME_TRYV(take(item));
     }
     cursor = text_of(page, "next_cursor");
-    if (cursor.empty()) return out;
+    if (cursor.empty()) return boost::outcome_v2::success();
   }
   return stranger(target, "the list has no end");
+}
+
+Result<std::vector<Json>> Peer::list(const std::string& target) {
+  std::vector<Json> out;
+  std::size_t bytes = 0;
+  BOOST_OUTCOME_TRYV(each(target, [&](const Json& item) -> Result<void> {
+    bytes += to_wire(item).size();
+    if (bytes > k_most_kept_bytes)
+      return stranger(target, "the list is longer than " + std::to_string(k_most_kept_bytes >> 20) + " MiB");
+    out.push_back(item);
+    return boost::outcome_v2::success();
+  }));
+  return out;
 }
 
 }  // namespace anchord::sync

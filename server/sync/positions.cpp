@@ -4,7 +4,9 @@
 #include <cstdio>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <set>
 
+#include "api/kit/support.hpp"
 #include "core/base/sha256.hpp"
 #include "core/base/to_wire.hpp"
 #include "core/geo/enu.hpp"
@@ -19,7 +21,14 @@ using Json = nlohmann::json;
 struct Position {
   std::string network_id, site, calibration, override_reason, revision, calibrated_at;
   std::optional<Wgs84> at{};
+  std::size_t bytes() const {
+    return network_id.size() + site.size() + calibration.size() + override_reason.size() + revision.size() +
+           calibrated_at.size();
+  }
 };
+
+/// What a stranger in a server's place may send and we keep.
+constexpr std::size_t k_most_positions = 500'000, k_most_position_bytes = 2'000;
 
 std::optional<Wgs84> point_of(const Json& feature) {
   const Json& c = member(member(feature, "geometry"), "coordinates");
@@ -50,20 +59,28 @@ std::string in_words(const Position& position) {
   return std::string(at) + ", revision " + position.revision + ", calibrated " + position.calibrated_at;
 }
 
-/// By network id; those whose calibration is known.
-Result<std::map<std::string, Position>> published(Peer& peer) {
-  BOOST_OUTCOME_TRY(const auto features, peer.list("/api/v1/anchors"));
+/// By network id; those whose calibration is known, of all sites or of these.
+Result<std::map<std::string, Position>> published(Peer& peer, const std::vector<Site>* sites = nullptr) {
+  std::vector<std::string> targets;
+  if (sites == nullptr) targets.emplace_back("/api/v1/anchors");
+  for (const auto& site : sites ? *sites : std::vector<Site>{})
+    targets.push_back("/api/v1/anchors?site=" + api::percent_encoded(site.id));
   std::map<std::string, Position> out;
-  for (const auto& feature : features) {
-    auto position = position_of(feature);
-    if (!position.calibration.empty()) out.emplace(position.network_id, std::move(position));
+  for (const auto& target : targets) {
+    BOOST_OUTCOME_TRYV(peer.each(target, [&](const Json& feature) -> Result<void> {
+      auto position = position_of(feature);
+      if (position.bytes() > k_most_position_bytes || out.size() >= k_most_positions)
+        return peer.stranger(target, "more or longer positions than a server has");
+      if (!position.calibration.empty()) out.emplace(position.network_id, std::move(position));
+      return boost::outcome_v2::success();
+    }));
   }
   return out;
 }
 
 /// Whether the anchor's position rested on this calibration at some time.
 Result<bool> had(Peer& peer, const std::string& network_id, const std::string& calibration) {
-  BOOST_OUTCOME_TRY(const auto history, peer.get("/api/v1/anchors/" + network_id + "/history"));
+  BOOST_OUTCOME_TRY(const auto history, peer.get(path_of("anchors", network_id, "/history")));
   for (const auto& item : member(history, "items"))
     if (text_of(item, "calibration") == calibration) return true;
   return false;
@@ -71,14 +88,14 @@ Result<bool> had(Peer& peer, const std::string& network_id, const std::string& c
 
 class Positions {
  public:
-  Positions(Peer& field, Peer& centre, const SyncOptions& options, Outcome& outcome)
-      : field_(field), centre_(centre), options_(options), out_(outcome) {}
+  explicit Positions(Run& run) : run_(run), out_(run.outcome) {}
 
-  Result<void> run() {
-    BOOST_OUTCOME_TRY(const auto ours, published(field_));
+  Result<void> compare_all() {
+    const bool some = !run_.options.sites.empty();
+    BOOST_OUTCOME_TRY(const auto ours, published(run_.source(), some ? &run_.sites : nullptr));
     if (ours.empty()) return boost::outcome_v2::success();
-    BOOST_OUTCOME_TRY(const auto theirs, published(centre_));
-    BOOST_OUTCOME_TRY(const auto sites, field_.list("/api/v1/sites?fields=id,name"));
+    BOOST_OUTCOME_TRY(const auto theirs, published(run_.target()));
+    BOOST_OUTCOME_TRY(const auto sites, run_.source().list("/api/v1/sites?fields=id,name"));
     for (const auto& site : sites) site_names_[text_of(site, "id")] = text_of(site, "name");
     for (const auto& [id, mine] : ours) {
       const auto there = theirs.find(id);
@@ -89,6 +106,14 @@ class Positions {
       BOOST_OUTCOME_TRYV(compare(mine, there->second));
     }
     decide();
+    return boost::outcome_v2::success();
+  }
+  std::set<std::string> calibrations() const {
+    std::set<std::string> out;
+    for (const auto& [calibration, anchors] : wanted_) out.insert(calibration);
+    return out;
+  }
+  Result<void> publish_all() {
     for (const auto& [calibration, anchors] : wanted_) {
       BOOST_OUTCOME_TRYV(publish(calibration, anchors));
     }
@@ -98,7 +123,7 @@ class Positions {
  private:
   struct Wanted {
     Position position;
-    std::string over;     ///< the revision at the centre that it follows; empty: none
+    std::string over;     ///< the revision at the target that it follows; empty: none
     std::string decided;  ///< by a person; also the reason where a gate fails there
   };
 
@@ -107,13 +132,13 @@ class Positions {
       ++out_.anchors_there;
       return boost::outcome_v2::success();
     }
-    BOOST_OUTCOME_TRY(const bool field_moved_on, had(field_, mine.network_id, there.calibration));
-    if (field_moved_on) {
+    BOOST_OUTCOME_TRY(const bool source_moved_on, had(run_.source(), mine.network_id, there.calibration));
+    if (source_moved_on) {
       wanted_[mine.calibration].push_back({mine, there.revision, {}});
       return boost::outcome_v2::success();
     }
-    BOOST_OUTCOME_TRY(const bool centre_moved_on, had(centre_, mine.network_id, mine.calibration));
-    if (centre_moved_on) {
+    BOOST_OUTCOME_TRY(const bool target_moved_on, had(run_.target(), mine.network_id, mine.calibration));
+    if (target_moved_on) {
       ++out_.anchors_there;
       return boost::outcome_v2::success();
     }
@@ -122,36 +147,44 @@ class Positions {
   }
 
   void decide() {
+    const Keep of_target = run_.up() ? Keep::centre : Keep::field;
     for (const auto& [site, anchors] : conflicts_) {
       const std::string& name = site_names_[site];
-      const auto keep = options_.decisions.of(site, name);
-      if (keep == Keep::centre) {
+      const auto keep = run_.options.decisions.of(site, name);
+      if (!keep) {
+        out_.undecided.push_back(conflict(site, name, anchors));
+      } else if (keep == of_target) {
         out_.anchors_left += anchors.size();
-      } else if (keep == Keep::field) {
-        for (const auto& [mine, there] : anchors)
-          wanted_[mine.calibration].push_back(
-              {mine, there.revision, "kept instead of revision " + there.revision + " of the centre"});
       } else {
-        Conflict conflict{site, name, {}};
-        for (const auto& [mine, there] : anchors) {
-          std::optional<double> distance_m;
-          if (mine.at && there.at) distance_m = EnuFrame(*there.at).enu_from_wgs84(*mine.at).m.norm();
-          conflict.anchors.push_back({mine.network_id, in_words(mine), in_words(there), distance_m});
-        }
-        out_.undecided.push_back(std::move(conflict));
+        for (const auto& [mine, there] : anchors)
+          wanted_[mine.calibration].push_back({mine, there.revision,
+                                               "kept instead of revision " + there.revision + " of the " +
+                                                   std::string(k_keep_words.word(of_target))});
       }
     }
+  }
+
+  Conflict conflict(const std::string& site, const std::string& name,
+                    const std::vector<std::pair<Position, Position>>& anchors) const {
+    Conflict out{site, name, {}};
+    for (const auto& [mine, there] : anchors) {
+      std::optional<double> distance_m;
+      if (mine.at && there.at) distance_m = EnuFrame(*there.at).enu_from_wgs84(*mine.at).m.norm();
+      const auto &field = run_.up() ? mine : there, &centre = run_.up() ? there : mine;
+      out.anchors.push_back({mine.network_id, in_words(field), in_words(centre), distance_m});
+    }
+    return out;
   }
 
   Result<void> publish(const std::string& calibration, const std::vector<Wanted>& anchors) {
     const std::string name =
         "calibration " + calibration + ", " + std::to_string(anchors.size()) + " anchors";
-    if (options_.dry_run) {
-      options_.report(name + ": would publish");
+    if (run_.options.dry_run) {
+      run_.report(name + ": would publish");
       return boost::outcome_v2::success();
     }
     Json body{{"anchors", Json::array()}, {"overrides", Json::array()}};
-    std::string note = "anchord sync from " + field_.url();
+    std::string note = "anchord sync from " + run_.source().url();
     Sha256 once;
     once.add(calibration);
     for (const auto& [position, over, decided] : anchors) {
@@ -167,27 +200,25 @@ class Positions {
       note += ": " + over->decided;
     body["note"] = note;
     const std::string text = to_wire(body);
-    PeerRequest request{"POST", "/api/v1/calibrations/" + calibration + "/publish", text};
+    PeerRequest request{"POST", path_of("calibrations", calibration, "/publish"), text};
     // An answer that was lost must not become a second revision.
-    request.idempotency_key = "sync-" + once.hex();
-    BOOST_OUTCOME_TRY(const auto answer, centre_.call(request));
+    request.headers.emplace("Idempotency-Key", "sync-" + once.hex());
+    BOOST_OUTCOME_TRY(const auto answer, run_.target().call(request));
     if (answer.status == 201) {
       out_.anchors_published += anchors.size();
-      options_.report(name + ": published");
+      run_.report(name + ": published");
     } else {
-      refused(out_, options_, name + ": " + sync::in_words(answer));
+      run_.failed(name + ": " + sync::in_words(answer));
     }
     return boost::outcome_v2::success();
   }
 
-  Peer& field_;
-  Peer& centre_;
-  const SyncOptions& options_;
+  Run& run_;
   Outcome& out_;
   std::map<std::string, std::string> site_names_;
   /// By calibration; ids are of their time, so oldest first.
   std::map<std::string, std::vector<Wanted>> wanted_;
-  std::map<std::string, std::vector<std::pair<Position, Position>>> conflicts_;  ///< by site: here, there
+  std::map<std::string, std::vector<std::pair<Position, Position>>> conflicts_;  ///< by site: source, target
 };
 
 }  // namespace
@@ -199,8 +230,17 @@ std::optional<Keep> Decisions::of(const std::string& site_id, const std::string&
   return everywhere;
 }
 
-Result<void> publish_positions(Peer& field, Peer& centre, const SyncOptions& options, Outcome& outcome) {
-  return Positions(field, centre, options, outcome).run();
+Result<std::set<std::string>> wanted_calibrations(const Run& run) {
+  Run apart{run.field, run.centre, run.options, {}, run.sites, run.whole_servers};
+  Positions positions(apart);
+  BOOST_OUTCOME_TRYV(positions.compare_all());
+  return positions.calibrations();
+}
+
+Result<void> publish_positions(Run& run) {
+  Positions positions(run);
+  BOOST_OUTCOME_TRYV(positions.compare_all());
+  return positions.publish_all();
 }
 
 }  // namespace anchord::sync

@@ -1,9 +1,10 @@
-// Buildings, floors and pictures of plans, with their site: what no bundle of a flight has.
+// Sites without their flights: frames, plans, anchors, buildings, floors and pictures of their plans.
 #include <nlohmann/json.hpp>
 #include <set>
 
 #include "api/formats/bundle_manifest.hpp"
 #include "server/sync/peer.hpp"
+#include "server/sync/spool.hpp"
 #include "server/sync/sync.hpp"
 #include "server/sync/taken.hpp"
 
@@ -12,64 +13,138 @@ namespace {
 
 using Json = nlohmann::json;
 
-struct Sending {
-  Peer &field, &centre;
-  const SyncOptions& options;
-  Outcome& outcome;
-  Taken taken;
-};
+class Sites {
+ public:
+  explicit Sites(Run& run) : run_(run), taken_(run.options.state_file, run.centre.url()) {}
 
-Result<void> send(Sending& s, const std::string& id) {
-  const std::string what = "site " + id;
-  BOOST_OUTCOME_TRY(const auto made, s.field.call({.method = "GET",
-                                                   .target = "/api/v1/sites/" + id + "/bundle?flights=false",
-                                                   .bundle = true}));
-  const auto failed = [&](const server::ClientResponse& answer) {
-    refused(s.outcome, s.options, what + ": " + sync::in_words(answer));
-    return Result<void>(boost::outcome_v2::success());
-  };
-  if (made.status != 200) return failed(made);
-  BOOST_OUTCOME_TRY(const auto text, manifest_of(made.body));
-  BOOST_OUTCOME_TRY(const auto manifest, api::read_site_manifest(text));
-  const std::string digest = api::site_bundle_digest(manifest), size = megabytes(made.body.size());
-  if (s.taken.has(id, digest)) {
-    // It may have been removed there since, or the centre be another one at the same address.
-    BOOST_OUTCOME_TRY(const auto there, s.centre.call({"GET", "/api/v1/sites/" + id}));
-    if (there.status == 200) return boost::outcome_v2::success();
-  }
-  if (s.options.dry_run) {
-    s.options.report(what + " with its floors: would send " + size);
+  Result<void> send_all() {
+    if (!run_.up()) {
+      for (const auto& site : run_.sites) {
+        BOOST_OUTCOME_TRYV(send(site.id, "site \"" + site.name + '"'));
+      }
+      return boost::outcome_v2::success();
+    }
+    // Of the others a flight has all there is.
+    BOOST_OUTCOME_TRY(const auto buildings, run_.field.list("/api/v1/buildings?fields=site"));
+    std::set<std::string> sites;
+    for (const auto& building : buildings) sites.insert(text_of(building, "site"));
+    for (const auto& id : sites) {
+      BOOST_OUTCOME_TRYV(send(id, "site " + id + " with its floors"));
+    }
     return boost::outcome_v2::success();
   }
-  s.options.report(what + " with its floors: " + size);
-  BOOST_OUTCOME_TRY(const auto answer, s.centre.call({.method = "POST",
-                                                      .target = "/api/v1/bundles",
-                                                      .body = made.body,
-                                                      .type = api::k_site_bundle_type,
-                                                      .bundle = true}));
-  if (answer.status != 200 && answer.status != 201) return failed(answer);
-  const auto json = Json::parse(answer.body, nullptr, false);
-  if (text_of(json, "site") != id || text_of(json, "digest") != "sha256:" + digest)
-    return s.centre.stranger("POST /api/v1/bundles",
-                             "the answer does not belong to the bundle that was sent");
-  for (const auto& left : member(json, "left_out"))
-    s.options.report(what + ": " + text_of(left, "what") + " left out: " + text_of(left, "why"));
-  if (const auto noted = s.taken.note(id, digest); !noted)
-    s.options.report(noted.error().message + "; the next run sends this site again");
-  return boost::outcome_v2::success();
-}
+
+ private:
+  static std::string bundle_path(const std::string& id) {
+    return path_of("sites", id, "/bundle?flights=false");
+  }
+  Result<void> failed(const std::string& what, const server::ClientResponse& answer) {
+    run_.failed(what + ": " + sync::in_words(answer));
+    return boost::outcome_v2::success();
+  }
+  /// Of the bundle in the file, which must be of this site and without flights.
+  static Result<std::string> digest_of(const Peer& peer, const std::string& id, const Spool& file) {
+    const auto text = manifest_of(file);
+    if (!text) return peer.stranger(bundle_path(id), text.error().message);
+    const auto manifest = api::read_site_manifest(text.value());
+    if (!manifest) return peer.stranger(bundle_path(id), manifest.error().message);
+    if (to_string(manifest.value().site) != id)
+      return peer.stranger(bundle_path(id),
+                           "the bundle is of another site, " + to_string(manifest.value().site));
+    for (const auto& entry : manifest.value().entries)
+      if (entry.name.starts_with(api::k_bundle_flights))
+        return peer.stranger(bundle_path(id), "the bundle has flights, which were not asked for");
+    return api::site_bundle_digest(manifest.value());
+  }
+
+  /// What the field has of it, as a digest; empty: nothing.
+  Result<std::string> at_field(const std::string& id) {
+    BOOST_OUTCOME_TRY(const auto file, spool());
+    BOOST_OUTCOME_TRY(const auto made, fetch(run_.field, id, file, {}));
+    if (made.status != 200) return std::string();
+    return digest_of(run_.field, id, file);
+  }
+  Result<Spool> spool() const { return Spool::make(run_.options.state_file.parent_path()); }
+  static Result<server::ClientResponse> fetch(Peer& peer, const std::string& id, const Spool& file,
+                                              const std::string& known) {
+    PeerRequest request{.method = "GET",
+                        .target = bundle_path(id),
+                        .into = &file,
+                        .most_bytes = k_most_bundle_bytes,
+                        .bundle = true};
+    if (!known.empty()) request.headers.emplace("If-None-Match", "\"sha256:" + known + '"');
+    return peer.call(request);
+  }
+
+  /// It may have been removed there since, or the centre be another one at the same address.
+  Result<bool> has_been_sent(const std::string& id, const std::string& digest) {
+    if (!run_.up() || !taken_.has(id, digest)) return false;
+    BOOST_OUTCOME_TRY(const auto there, run_.target().call({"GET", path_of("sites", id)}));
+    return there.status == 200;
+  }
+
+  Result<void> send(const std::string& id, const std::string& what) {
+    std::string known;
+    if (!run_.up()) {
+      BOOST_OUTCOME_TRY(known, at_field(id));
+      if (known.empty() && run_.options.dry_run) {
+        run_.report(what + ": would be taken");
+        return boost::outcome_v2::success();
+      }
+    }
+    BOOST_OUTCOME_TRY(const auto file, spool());
+    BOOST_OUTCOME_TRY(const auto made, fetch(run_.source(), id, file, known));
+    if (made.status == 304) return there(id, known);
+    if (!run_.up() && (made.status == 404 || made.status == 405 || made.status == 422))
+      return make_error(Errc::unsupported, run_.centre.url() + " does not give bundles of sites (" +
+                                               sync::in_words(made) +
+                                               "): it is older than this program, update it");
+    if (made.status != 200) return failed(what, made);
+    BOOST_OUTCOME_TRY(const auto digest, digest_of(run_.source(), id, file));
+    BOOST_OUTCOME_TRY(const bool sent, has_been_sent(id, digest));
+    if (sent || digest == known) return there(id, digest);
+    if (run_.options.dry_run) {
+      run_.report(what + (run_.up() ? ": would send " : ": would take ") + megabytes(file.bytes()));
+      return boost::outcome_v2::success();
+    }
+    run_.report(what + ": " + megabytes(file.bytes()));
+    BOOST_OUTCOME_TRY(const auto answer, run_.target().call({.method = "POST",
+                                                             .target = "/api/v1/bundles",
+                                                             .type = api::k_site_bundle_type,
+                                                             .from = &file,
+                                                             .bundle = true}));
+    if (answer.status != 200 && answer.status != 201) return failed(what, answer);
+    return arrived(id, what, digest, json_of(answer));
+  }
+
+  Result<void> there(const std::string& id, const std::string& digest) {
+    ++run_.outcome.sites_there;
+    return note(id, digest);
+  }
+  Result<void> note(const std::string& id, const std::string& digest) {
+    if (run_.options.dry_run || taken_.has(id, digest)) return boost::outcome_v2::success();
+    if (const auto noted = taken_.note(id, digest); !noted)
+      run_.report(noted.error().message + "; the next run sends this site again");
+    return boost::outcome_v2::success();
+  }
+
+  Result<void> arrived(const std::string& id, const std::string& what, const std::string& digest,
+                       const Json& answer) {
+    if (text_of(answer, "site") != id || text_of(answer, "digest") != "sha256:" + digest)
+      return run_.target().stranger("POST /api/v1/bundles",
+                                    "the answer does not belong to the bundle that was sent");
+    for (const auto& left : member(answer, "left_out"))
+      run_.left_out(what, text_of(left, "what"), text_of(left, "why"));
+    ++(member(answer, "already") == true ? run_.outcome.sites_there : run_.outcome.sites_sent);
+    return note(id, digest);
+  }
+
+  Run& run_;
+  Taken taken_;
+};
 
 }  // namespace
 
-Result<void> send_sites(Peer& field, Peer& centre, const SyncOptions& options, Outcome& outcome) {
-  BOOST_OUTCOME_TRY(const auto buildings, field.list("/api/v1/buildings?fields=site"));
-  std::set<std::string> sites;
-  for (const auto& building : buildings) sites.insert(text_of(building, "site"));
-  Sending sending{field, centre, options, outcome, Taken(options.state_file, centre.url())};
-  for (const auto& site : sites) {
-    BOOST_OUTCOME_TRYV(send(sending, site));
-  }
-  return boost::outcome_v2::success();
-}
+Result<void> send_sites(Run& run) { return Sites(run).send_all(); }
 
 }  // namespace anchord::sync

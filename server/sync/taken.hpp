@@ -8,8 +8,8 @@
 
 namespace anchord::sync {
 
-/// What a centre has taken of each flight and site: a digest of what was sent, by URL and id. A saving alone:
-/// without it everything is sent again and found there. One at a time for a file.
+/// What a centre has of each flight and site: a digest of what was sent to it or came from it, by URL and id.
+/// A saving alone: without it everything is sent again and found there. One at a time for a file.
 class Taken {
  public:
   Taken(std::filesystem::path file, std::string url);
@@ -22,10 +22,5 @@ class Taken {
   std::string url_;
   std::map<std::string, std::map<std::string, std::string>> all_;  ///< digests by URL and id
 };
-
-std::string megabytes(std::size_t bytes);
-
-/// The text of a bundle's manifest. errors: storage_full, those of the zip file
-Result<std::string> manifest_of(const std::string& bundle);
 
 }  // namespace anchord::sync

@@ -77,6 +77,7 @@ const mapping = {
 export class LinkProxy {
   bytesPerS = 0;
   toServer = 0; // bytes
+  toClient = 0;
   #pairs = new Set();
   #waiting = [];
   #state = 'up';
@@ -114,7 +115,7 @@ export class LinkProxy {
     server.on('error', end).on('close', end);
     client.on('error', end).on('close', end);
     this.#pump(client, server, (n) => (this.toServer += n));
-    this.#pump(server, client, () => {});
+    this.#pump(server, client, (n) => (this.toClient += n));
   }
   /** Bytes leave at the rate of the link, and no more are read than are on their way. */
   #pump(from, to, count) {

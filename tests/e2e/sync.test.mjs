@@ -3,74 +3,23 @@
 import assert from 'node:assert/strict';
 import { spawn } from 'node:child_process';
 import { existsSync, mkdtempSync, rmSync, writeFileSync } from 'node:fs';
-import { createServer, request } from 'node:http';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { after, before, test } from 'node:test';
-import { ndjson, simulatedFlight } from './flight.mjs';
 import { LinkProxy } from './gateway.mjs';
 import { placed_floor, room_png } from './room.mjs';
 import { binary, eventually, run, startServer } from './server.mjs';
+import { counted, fly, json, lossy, ok, published, rows, stranger } from './sync_parts.mjs';
 
 const folder = mkdtempSync(join(tmpdir(), 'anchord sync '));
 let field, centre, proxy;
 const flights = [];
 
-async function ok(server, path, init) {
-  let answer = await server.fetch(path, init);
-  // A quick machine asks more than one token may: as every client, it waits as long as it is told.
-  while (answer.status === 429) {
-    await new Promise((done) => setTimeout(done, 1000 * Number(answer.headers.get('retry-after'))));
-    answer = await server.fetch(path, init);
-  }
-  const text = await answer.text();
-  assert.ok(answer.ok, `${path}: ${answer.status} ${text}`);
-  return text ? JSON.parse(text) : null;
-}
-const rows = (list) => ({
-  method: 'POST',
-  headers: { 'content-type': 'application/x-ndjson' },
-  body: ndjson(list),
-});
-
-/** A finished flight of a server, solved and published there. */
-async function fly(server, seed, site) {
-  const flight = await simulatedFlight({ seed, duration: 120 });
-  const { id } = await ok(server, '/api/v1/missions?devices=false', { json: { ...flight.mission, site } });
-  await ok(server, `/api/v1/fixes?mission=${id}`, rows(flight.fixes));
-  await ok(server, `/api/v1/ranges?mission=${id}`, rows(flight.ranges));
-  await ok(server, `/api/v1/missions/${id}/actions`, { json: { action: 'finish' } });
-  const solved = await ok(server, '/api/v1/calibrations', {
-    json: { missions: [id] },
-    headers: { prefer: 'wait=120' },
-  });
-  await ok(server, `/api/v1/calibrations/${solved.id}/publish`, { json: { note: `seed ${seed}` } });
-  return { id, calibration: solved.id };
-}
-/** Published positions of a server, to the last digit: coordinates have 1e-9 degrees and more. */
-const published = async (server) =>
-  Object.fromEntries(
-    (await ok(server, '/api/v1/anchors')).features
-      .filter((f) => f.properties.provenance.calibration)
-      .map((f) => [
-        f.properties.network_id,
-        { at: f.geometry, enu_m: f.properties.enu_m, calibration: f.properties.provenance.calibration },
-      ]),
-  );
-/** What a server has, counted; its revisions by what they rest on. */
-async function counted(server) {
-  const missions = (await ok(server, '/api/v1/missions?limit=100')).items.filter((m) => m.state === 'finished');
-  return {
-    missions: missions.map((m) => [m.id, m.n_ranges, m.n_fixes]).sort(),
-    calibrations: (await ok(server, '/api/v1/calibrations?limit=100')).items.map((c) => c.id).sort(),
-    models: (await ok(server, '/api/v1/models?limit=100')).items.map((m) => m.sha256).sort(),
-    revisions: (await ok(server, '/api/v1/revisions?limit=100')).items.map((r) => r.calibration),
-  };
-}
-const words = (to, ...args) => [
-  ...['sync', '--to', to, '--token-file', join(folder, 'token'), '--data-dir', field.dataDir],
+const words_as = (token, to, ...args) => [
+  ...['sync', '--to', to, '--token-file', join(folder, token), '--data-dir', field.dataDir],
   ...args,
 ];
+const words = (to, ...args) => words_as('token', to, ...args);
 const sync = (...args) => run(words(proxy.url, ...args), { deadlineMs: 120_000 });
 
 before(async () => {
@@ -94,23 +43,6 @@ test('a dry run lists what would go and sends nothing', async () => {
   assert.equal((await ok(centre, '/api/v1/missions')).items.length, 0);
 });
 
-/** A centre that answers everything alike, or what `answer` says of a request. */
-async function stranger(answer, use) {
-  const server = createServer((req, res) => {
-    req.on('error', () => {}).resume();
-    answer(req, res);
-  });
-  await new Promise((done) => server.listen(0, '127.0.0.1', done));
-  try {
-    return await use(`http://127.0.0.1:${server.address().port}`);
-  } finally {
-    server.closeAllConnections();
-    await new Promise((done) => server.close(done));
-  }
-}
-const json = (res, status, value) => {
-  res.writeHead(status, { 'content-type': 'application/json' }).end(JSON.stringify(value));
-};
 /** An anchord by its version and its token, and something else from there on. */
 const impostor = (rest) => (req, res) => {
   if (req.url === '/version') json(res, 200, { version: '0.1.0' });
@@ -308,26 +240,9 @@ test('killed at any moment, with a centre that is killed as well, it brings ever
 test('an answer that is lost makes no second flight, model or revision', async () => {
   flights.push(await fly(field, 23));
   const lost = new Set();
-  const answer = (req, res) => {
-    const on = request(
-      { host: '127.0.0.1', port: centre.port, path: req.url, method: req.method, headers: req.headers },
-      (back) => {
-        const first = req.method === 'POST' && !lost.has(req.url);
-        lost.add(req.method === 'POST' ? req.url : '');
-        if (first) back.resume().on('end', () => res.destroy());
-        else back.pipe(res.writeHead(back.statusCode, back.headers));
-      },
-    );
-    on.on('error', () => res.destroy());
-    req.pipe(on);
-  };
-  const server = createServer(answer);
-  await new Promise((done) => server.listen(0, '127.0.0.1', done));
-  const { code, stdout, stderr } = await run(words(`http://127.0.0.1:${server.address().port}`), {
-    deadlineMs: 120_000,
-  });
-  server.closeAllConnections();
-  await new Promise((done) => server.close(done));
+  const { code, stdout, stderr } = await stranger(lossy(centre, lost), (url) =>
+    run(words(url), { deadlineMs: 120_000 }),
+  );
   assert.equal(code, 0, stdout + stderr);
   assert.ok(
     [...lost].some((url) => url.endsWith('/publish')),
@@ -419,8 +334,9 @@ test('buildings, floors and their plans go with their site, once', async () => {
 
 test('what cannot go is refused with what to do', async () => {
   writeFileSync(join(folder, 'wrong'), 'anc_0123\n');
-  const token = await run([...words(proxy.url), '--token-file', join(folder, 'wrong')]);
+  const token = await run(words_as('wrong', proxy.url));
   assert.equal(token.code, 2, token.stderr);
+  assert.match(token.stderr, /401 .*--token-file must give a file with a token of that server \(role engineer\)/);
   const keep = await sync('--keep', 'mine');
   assert.equal(keep.code, 2);
   assert.match(keep.stderr, /--keep mine: must be field, centre, or SITE=field/);
