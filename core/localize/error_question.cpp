@@ -116,7 +116,7 @@ std::string why_track_heights(const ErrorAnswer& answer) {
   else
     std::snprintf(
         text, sizeof text,
-        "by the ranges the heights of the track are too far %s, by a factor of %.3f with sigma %.3f "
+        "by the ranges the heights of the track are too far %s by a factor of %.3f with sigma %.3f "
         "(%.1f sigma): heights of a barometer, or in another unit; use those of the RTK receiver",
         found.value > 0 ? "apart" : "together", 1 + found.value, found.sigma, std::abs(found.z));
   return text;

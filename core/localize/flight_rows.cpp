@@ -76,17 +76,17 @@ bool has_arm_across(const FlightData& flight) {
 bool heading_stands_still(const std::vector<Fix>& fixes) {
   if (fixes.empty() || seconds_between(fixes.front().time, fixes.back().time) < k_still_s) return false;
   const auto forward = [](const Fix& fix) -> Eigen::Vector2d {
-    return (*fix.attitude * Eigen::Vector3d::UnitX()).head<2>().normalized();
+    return (*fix.enu_from_body * Eigen::Vector3d::UnitX()).head<2>().normalized();
   };
   return std::ranges::all_of(fixes, [&](const Fix& fix) {
-    return fix.attitude && (forward(fix) - forward(fixes.front())).norm() < k_still_rad;
+    return fix.enu_from_body && (forward(fix) - forward(fixes.front())).norm() < k_still_rad;
   });
 }
 
 /// A heading that stands still is not taken for one, where an arm would be turned by it.
 void drop_still_heading(const FlightData& flight, std::vector<Fix>& fixes, std::vector<std::string>& notes) {
   if (!has_arm_across(flight) || !heading_stands_still(fixes)) return;
-  for (Fix& fix : fixes) fix.attitude.reset();
+  for (Fix& fix : fixes) fix.enu_from_body.reset();
   notes.emplace_back(
       "the heading of the track is the same in all positions, to the last digit: it is taken as not "
       "measured");

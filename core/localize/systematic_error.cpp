@@ -117,6 +117,7 @@ Sums sums_of_antenna(const JointLines& lines, const AskedColumns& columns, std::
       lines.begin(L::left),  columns.near.data()};
   for (std::size_t k = 0; k < k_error_kinds; ++k) distinct[k_of_lines + 1 + k] = columns.asked[k].data();
   distinct.back() = columns.residual.data();
+  constexpr int ones = 3, lever = 6;
   // Of each column of Sums, among those; -1: nothing.
   std::array<int, k_own + k_rest> from{0, 1, 2, ones, ones, 4, 5, lever, 7, 8};
   static_assert(k_own + k_shared_antennas == 10 && k_shared_curve == 1 && k_shared_lag == 2 &&

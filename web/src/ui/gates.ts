@@ -76,6 +76,16 @@ const WORDS: Record<string, Words> = {
     fails: 'The ranges drift over the flight: a radio that was not warm, or a clock',
     unit: 'm',
   },
+  track_drift: {
+    passes: 'No drift of the positions over the flight',
+    fails: 'The positions drift over the flight, as RTK fixed ones do not',
+    unit: 'm',
+  },
+  track_heights: {
+    passes: 'The heights of the track fit the ranges',
+    fails: 'The heights of the track are too far apart or together: from a barometer, or in another unit',
+    unit: '%',
+  },
   track_shift: {
     passes: 'No shift of the track at its gaps',
     fails: 'A part of the track is shifted against the rest: wrong fix, or the base position changed',
