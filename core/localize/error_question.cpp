@@ -17,7 +17,7 @@ constexpr double k_failing_z = 4.0;
 constexpr KnownError k_factor_of_all{0.05, 0.005, 0.07}, k_factor_of_some{0.05, 0.005, 0.05};
 constexpr KnownError k_height_step{0.3, 0.10, 0.02}, k_drift{0.3, 0.10, 0.02};
 // Positions that are no RTK fixes but pass for some, and heights of a barometer.
-constexpr KnownError k_track_drift{0.5, 0.15, 0.005}, k_track_heights{0.05, 0.02, 0.005};
+constexpr KnownError k_track_drift{0.5, 0.15, 0.002}, k_track_heights{0.05, 0.02, 0.005};
 
 std::string whose(const FlightRows& flight, const ErrorQuestion& question) {
   if (question.antenna) {
@@ -82,25 +82,22 @@ std::string why_drift(const ErrorAnswer& answer) {
 }
 
 std::string why_track_drift(const ErrorAnswer& answer) {
+  constexpr std::array k_ways{"eastward", "northward", "in height"};
   const ErrorFinding& found = answer.found;
-  const bool up = answer.question.kind == ErrorKind::track_up;
-  const char* way = up                                              ? "in height"
-                    : answer.question.kind == ErrorKind::track_east ? "eastward"
-                                                                    : "northward";
+  const char* way = k_ways[answer.question.axis()];
+  // A straight line goes from minus half to half of its value, waves from minus one to one.
+  const char* course = answer.question.bends() == 0 ? "over the flight" : "to and fro during the flight";
+  const double size_m = (answer.question.bends() == 0 ? 1.0 : 2.0) * std::abs(found.value);
   char text[400];
   if (answer.over_limit() <= 1)
-    std::snprintf(
-        text, sizeof text,
-        "no drift of the positions in time is seen: at most %+.3f m %s over the flight with sigma %.3f "
-        "m (%.1f sigma)",
-        found.value, way, found.sigma, std::abs(found.z));
+    std::snprintf(text, sizeof text, "no drift of the positions is seen: at most %.3f m %s %s (%.1f sigma)",
+                  size_m, way, course, std::abs(found.z));
   else
-    std::snprintf(
-        text, sizeof text,
-        "by the ranges the positions of the track drift by %+.2f m %s over the flight with sigma %.2f m "
-        "(%.1f sigma), as RTK fixed ones do not: check the fix class and the base%s, and fly again",
-        found.value, way, found.sigma, std::abs(found.z),
-        up ? ", and that the heights are not of a barometer" : "");
+    std::snprintf(text, sizeof text,
+                  "by the ranges the positions of the track drift by %.2f m %s %s (%.1f sigma), as RTK fixed "
+                  "ones do not: check the fix class and the base%s, and fly again",
+                  size_m, way, course, std::abs(found.z),
+                  answer.question.axis() == 2 ? ", and that the heights are not of a barometer" : "");
   return text;
 }
 
@@ -114,16 +111,15 @@ std::string why_track_heights(const ErrorAnswer& answer) {
         "%.3f (%.1f sigma)",
         1 + found.value, found.sigma, std::abs(found.z));
   else
-    std::snprintf(
-        text, sizeof text,
-        "by the ranges the heights of the track are too far %s by a factor of %.3f with sigma %.3f "
-        "(%.1f sigma): heights of a barometer, or in another unit; use those of the RTK receiver",
-        found.value > 0 ? "apart" : "together", 1 + found.value, found.sigma, std::abs(found.z));
+    std::snprintf(text, sizeof text,
+                  "by the ranges the heights of the track are too far %s by a factor of %.3f with sigma %.3f "
+                  "(%.1f sigma): heights of a barometer, or in another unit; use those of the RTK receiver",
+                  found.value > 0 ? "apart" : "together", 1 + found.value, found.sigma, std::abs(found.z));
   return text;
 }
 
 std::string why(const FlightRows& flight, const FlightMiddle& middle, const ErrorAnswer& answer) {
-  switch (answer.question.kind) {
+  switch (answer.question.kind()) {
     case ErrorKind::factor:
       return why_factor(flight, answer);
     case ErrorKind::step:
@@ -132,42 +128,40 @@ std::string why(const FlightRows& flight, const FlightMiddle& middle, const Erro
       return why_drift(answer);
     case ErrorKind::track_heights:
       return why_track_heights(answer);
-    case ErrorKind::track_east:
-    case ErrorKind::track_north:
-    case ErrorKind::track_up:
+    case ErrorKind::track_drift:
       break;
   }
   return why_track_drift(answer);
 }
 
 /// The gate that a kind of error speaks in.
-constexpr std::array<std::string_view, k_error_kinds> k_gates{
-    "range_scale", "range_step", "range_drift", "track_drift", "track_drift", "track_drift", "track_heights"};
-std::string_view gate_of(ErrorKind kind) { return k_gates[static_cast<std::size_t>(kind)]; }
+std::string_view gate_of(ErrorKind kind) {
+  constexpr std::array<std::string_view, k_track_columns + 1> k_gates{
+      "range_scale", "range_step", "range_drift", "track_heights", "track_drift"};
+  return k_gates[static_cast<std::size_t>(kind)];
+}
 
 }  // namespace
 
 const KnownError& ErrorQuestion::known() const {
-  switch (kind) {
+  switch (kind()) {
     case ErrorKind::factor:
       break;
     case ErrorKind::step:
       return k_height_step;
     case ErrorKind::drift:
       return k_drift;
-    case ErrorKind::track_east:
-    case ErrorKind::track_north:
-    case ErrorKind::track_up:
-      return k_track_drift;
     case ErrorKind::track_heights:
       return k_track_heights;
+    case ErrorKind::track_drift:
+      return k_track_drift;
   }
   return all() ? k_factor_of_all : k_factor_of_some;
 }
 
 std::vector<ErrorQuestion> error_questions(const FlightRows& flight, const JointFit& fit) {
   std::vector<ErrorQuestion> questions;
-  for (std::size_t k = 0; k < k_error_kinds; ++k) questions.push_back({.kind = static_cast<ErrorKind>(k)});
+  for (std::size_t k = 0; k < k_error_columns; ++k) questions.push_back({.column = k});
   for (std::size_t k = 0; flight.antennas.size() > 1 && k < flight.antennas.size(); ++k)
     questions.push_back({.antenna = k});
   for (std::size_t i = 0; i < flight.anchors.size(); ++i)
@@ -177,8 +171,7 @@ std::vector<ErrorQuestion> error_questions(const FlightRows& flight, const Joint
 
 double chance_of_no_error() {
   double chance = 1.0 - k_factor_of_some.chance;
-  for (std::size_t k = 0; k < k_error_kinds; ++k)
-    chance -= ErrorQuestion{.kind = static_cast<ErrorKind>(k)}.known().chance;
+  for (std::size_t k = 0; k < k_error_columns; ++k) chance -= ErrorQuestion{.column = k}.known().chance;
   return chance;
 }
 
@@ -211,17 +204,19 @@ FlightMiddle middle_of(const FlightRows& flight, const JointState& state) {
 ErrorColumns error_columns(const FlightMiddle& middle, double t_s, double antenna_up_m,
                            const Eigen::Vector3d& to_anchor_m) {
   const double distance_m = to_anchor_m.norm(), share = (t_s - middle.from_s) / middle.length_s;
-  // A position that is off by a vector is seen as an anchor off by its opposite. The middle of the flight is
-  // taken for right: nothing tells which part is.
+  ErrorColumns out{distance_m, antenna_up_m > middle.up_m ? 1.0 : 0.0, share};
+  // A position that is off by a vector is seen as an anchor off by its opposite.
   const Eigen::Vector3d by_position = to_anchor_m / std::max(distance_m, 1e-9);
-  const double drifted = share - 0.5;
-  return {distance_m,
-          antenna_up_m > middle.up_m ? 1.0 : 0.0,
-          share,
-          by_position.x() * drifted,
-          by_position.y() * drifted,
-          by_position.z() * drifted,
-          by_position.z() * (antenna_up_m - middle.up_m)};
+  out[static_cast<std::size_t>(ErrorKind::track_heights)] = by_position.z() * (antenna_up_m - middle.up_m);
+  // Legendre's polynomials: none has a mean, for where the track is off as a whole nothing tells.
+  const double x = std::clamp(2 * share - 1, -1.0, 1.0);
+  const std::array<double, k_track_bends> waves{0.5 * x, 0.5 * (3 * x * x - 1),
+                                                0.5 * (5 * x * x * x - 3 * x)};
+  for (std::size_t axis = 0; axis < 3; ++axis)
+    for (std::size_t bends = 0; bends < k_track_bends; ++bends)
+      out[k_track_columns + axis * k_track_bends + bends] =
+          by_position[static_cast<Eigen::Index>(axis)] * waves[bends];
+  return out;
 }
 
 double ErrorAnswer::limit() const { return std::max(question.known().failing, k_failing_z * found.sigma); }
@@ -233,7 +228,7 @@ std::vector<Gate> error_gates(const FlightRows& flight, const FlightMiddle& midd
   for (const ErrorAnswer& answer : answers) {
     if (answer.question.anchor && *answer.question.anchor != anchor) continue;
     const auto same = std::ranges::find_if(worst, [&](const ErrorAnswer* other) {
-      return gate_of(other->question.kind) == gate_of(answer.question.kind);
+      return gate_of(other->question.kind()) == gate_of(answer.question.kind());
     });
     if (same == worst.end())
       worst.push_back(&answer);
@@ -242,7 +237,7 @@ std::vector<Gate> error_gates(const FlightRows& flight, const FlightMiddle& midd
   }
   std::vector<Gate> gates;
   for (const ErrorAnswer* one : worst)
-    gates.push_back({std::string(gate_of(one->question.kind)), std::abs(one->found.value), one->limit(),
+    gates.push_back({std::string(gate_of(one->question.kind())), std::abs(one->found.value), one->limit(),
                      one->over_limit() <= 1, why(flight, middle, *one)});
   return gates;
 }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <optional>
@@ -12,19 +13,19 @@
 
 namespace anchord {
 
-/// Errors that all residuals of a fit may hide, in the order of their columns.
+/// Errors that all residuals of a fit may hide.
 enum class ErrorKind : std::uint8_t {
-  factor,      ///< on the ranges
-  step,        ///< of the ranges, between the lower and the upper half of the heights flown
-  drift,       ///< of the ranges in time
-  track_east,  ///< drift of the track in time, along the axes of the answer
-  track_north,
-  track_up,
+  factor,         ///< on the ranges
+  step,           ///< of the ranges, between the lower and the upper half of the heights flown
+  drift,          ///< of the ranges in time
   track_heights,  ///< a factor on the heights of the track
+  track_drift,    ///< of the track in time
 };
-inline constexpr std::size_t k_error_kinds = 7;
-/// Those of the track.
-constexpr bool of_track(ErrorKind kind) { return kind >= ErrorKind::track_east; }
+/// Ways in which a track drifts along an axis of the answer: a straight line over the flight, one bend, two.
+inline constexpr std::size_t k_track_bends = 3;
+/// Every error has a column in the equations: one of each kind, and one for each axis and bend of a drift of
+/// the track.
+inline constexpr std::size_t k_track_columns = 4, k_error_columns = k_track_columns + 3 * k_track_bends;
 
 /// What is known of a kind of error before the ranges are asked.
 struct KnownError {
@@ -35,8 +36,13 @@ struct KnownError {
 
 /// An error and the ranges that may have it: all, or those of one antenna, or of one anchor.
 struct ErrorQuestion {
-  ErrorKind kind{ErrorKind::factor};
+  std::size_t column{};
   std::optional<std::size_t> antenna{}, anchor{};
+  ErrorKind kind() const { return static_cast<ErrorKind>(std::min(column, k_track_columns)); }
+  std::size_t axis() const {
+    return (column - k_track_columns) / k_track_bends;
+  }  ///< of a drift of the track
+  std::size_t bends() const { return (column - k_track_columns) % k_track_bends; }
   bool all() const { return !anchor && !antenna; }
   bool has(std::size_t of_anchor, std::size_t of_antenna) const {
     return (!anchor || *anchor == of_anchor) && (!antenna || *antenna == of_antenna);
@@ -44,7 +50,7 @@ struct ErrorQuestion {
   const KnownError& known() const;
 };
 
-/// What is asked of a flight: all kinds of all ranges first, in their order; then factors of some.
+/// What is asked of a flight: all columns of all ranges first, in their order; then factors of some.
 std::vector<ErrorQuestion> error_questions(const FlightRows& flight, const JointFit& fit);
 /// Chance of a flight to have none of the errors.
 double chance_of_no_error();
@@ -60,7 +66,7 @@ struct FlightMiddle {
 FlightMiddle middle_of(const FlightRows& flight, const JointState& state);
 
 /// What one unit of each error adds to a range over what is expected of it: metres a unit.
-using ErrorColumns = std::array<double, k_error_kinds>;
+using ErrorColumns = std::array<double, k_error_columns>;
 /// to_anchor_m  from the antenna
 ErrorColumns error_columns(const FlightMiddle& middle, double t_s, double antenna_up_m,
                            const Eigen::Vector3d& to_anchor_m);

@@ -25,8 +25,8 @@ constexpr double k_imitated_bias_m = 0.15;  // no factor is shown by ranges that
 constexpr double k_doubted_chi2 = 3, k_believed_chi2 = 9;
 
 // One range in the normal equations: by_anchor, by_shared, slope of near ranges, what is asked, residual.
-constexpr int k_kinds = static_cast<int>(k_error_kinds);
-constexpr int k_own = 4, k_near = k_shared_size, k_asked = k_near + 1, k_residual = k_asked + k_kinds,
+constexpr int k_errors = static_cast<int>(k_error_columns);
+constexpr int k_own = 4, k_near = k_shared_size, k_asked = k_near + 1, k_residual = k_asked + k_errors,
               k_rest = k_residual + 1;
 using Sums = Eigen::Matrix<double, k_own + k_rest, k_own + k_rest>;
 using Rest = Eigen::Matrix<double, k_rest, k_rest>;
@@ -74,7 +74,7 @@ double weight_per_m2(const WeighedRow& by, const JointRow& row, const JointLine&
 /// Columns of Sums beside those of the lines, and weights: 0 in whole groups of four beyond the rows.
 struct AskedColumns {
   std::vector<double> ones, near, residual, weight;
-  std::array<std::vector<double>, k_error_kinds> asked;
+  std::array<std::vector<double>, k_error_columns> asked;
   explicit AskedColumns(std::size_t padded)
       : ones(padded, 1.0), near(padded), residual(padded), weight(padded) {
     asked.fill(std::vector<double>(padded));
@@ -98,7 +98,7 @@ AskedColumns asked_columns(const ErrorTest::Given& given, std::size_t index, con
                                     lines.of(JointLines::antenna_z)[i]);
     const Eigen::Vector3d to_anchor_m = anchor_m - antenna_m;
     const ErrorColumns columns = error_columns(given.middle, row.t_s, antenna_m.z(), to_anchor_m);
-    for (std::size_t k = 0; k < k_error_kinds; ++k) out.asked[k][i] = columns[k];
+    for (std::size_t k = 0; k < k_error_columns; ++k) out.asked[k][i] = columns[k];
     out.near[i] = std::min(to_anchor_m.norm(), k_near_m) - k_near_right_m;
     out.residual[i] = by.residual_m;
     out.weight[i] = weight;
@@ -110,12 +110,12 @@ AskedColumns asked_columns(const ErrorTest::Given& given, std::size_t index, con
 Sums sums_of_antenna(const JointLines& lines, const AskedColumns& columns, std::span<const double> weights,
                      const std::optional<std::int8_t>& arm) {
   using L = JointLines;
-  constexpr std::size_t k_of_lines = 9, k_distinct = k_of_lines + 1 + k_error_kinds + 1;
+  constexpr std::size_t k_of_lines = 9, k_distinct = k_of_lines + 1 + k_error_columns + 1;
   std::array<const double*, k_distinct> distinct{
       lines.begin(L::x),     lines.begin(L::y),   lines.begin(L::z),     columns.ones.data(),
       lines.begin(L::curve), lines.begin(L::lag), lines.begin(L::lever), lines.begin(L::forward),
       lines.begin(L::left),  columns.near.data()};
-  for (std::size_t k = 0; k < k_error_kinds; ++k) distinct[k_of_lines + 1 + k] = columns.asked[k].data();
+  for (std::size_t k = 0; k < k_error_columns; ++k) distinct[k_of_lines + 1 + k] = columns.asked[k].data();
   distinct.back() = columns.residual.data();
   constexpr int ones = 3, lever = 6;
   // Of each column of Sums, among those; -1: nothing.
@@ -172,7 +172,7 @@ ErrorTest::ErrorTest(const Given& given, Weighing weighing) : given_(given) {
 /// Of one anchor, with the column of the question where the first of those asked is; where the question has
 /// no part, nothing stands there.
 Sums ErrorTest::sums_of(std::size_t anchor, const ErrorQuestion& question) const {
-  const int column = k_own + k_asked, asked = column + static_cast<int>(question.kind);
+  const int column = k_own + k_asked, asked = column + static_cast<int>(question.column);
   Sums all = Sums::Zero();
   for (std::size_t k = 0; k < anchors_[anchor].by_antenna.size(); ++k) {
     Sums sums = anchors_[anchor].by_antenna[k];
@@ -236,15 +236,14 @@ FlightRows corrected(const ErrorTest::Given& given, const ErrorQuestion& questio
   for (std::size_t i = 0; i < out.anchors.size(); ++i) {
     for (JointRow& row : out.anchors[i].rows) {
       if (!question.has(i, antenna_of(given.flight, row))) continue;
-      if (question.kind == ErrorKind::factor) {
+      if (question.kind() == ErrorKind::factor) {
         row.distance_m /= 1.0 + value;
         continue;
       }
       const JointState::Anchor& anchor = given.fit.state.anchors[i];
       const JointLine line = linearise(given.flight.track, row, given.fit.state.shared, anchor);
-      row.distance_m -=
-          value * error_columns(given.middle, row.t_s, line.antenna_m.z(),
-                                anchor.position_m - line.antenna_m)[static_cast<std::size_t>(question.kind)];
+      row.distance_m -= value * error_columns(given.middle, row.t_s, line.antenna_m.z(),
+                                              anchor.position_m - line.antenna_m)[question.column];
     }
   }
   return out;
@@ -269,7 +268,7 @@ Result<void> ask_again(const ErrorTest::Given& given, double first, ErrorAnswer&
   return boost::outcome_v2::success();
 }
 
-/// The first are of all ranges, in the order of ErrorKind.
+/// The first are of all ranges, in the order of their columns.
 Result<std::vector<ErrorAnswer>> answers_of(const ErrorTest::Given& given) {
   const ErrorTest fitted(given, Weighing::as_fitted), wide(given, Weighing::wide);
   std::vector<ErrorAnswer> answers;
@@ -344,10 +343,9 @@ Result<SystematicErrors> check_systematic_errors(const FlightRows& flight, const
   out.scale = found(ErrorKind::factor);
   out.step = found(ErrorKind::step);
   out.drift = found(ErrorKind::drift);
-  out.track_drift = std::ranges::max(
-      {found(ErrorKind::track_east), found(ErrorKind::track_north), found(ErrorKind::track_up)}, {},
-      &ErrorFinding::sigma);
   out.track_heights = found(ErrorKind::track_heights);
+  for (std::size_t k = k_track_columns; k < k_error_columns; ++k)
+    if (answers[k].found.sigma > out.track_drift.sigma) out.track_drift = answers[k].found;
   std::size_t n_wider = 0;
   for (std::size_t i = 0; i < flight.anchors.size(); ++i) {
     out.gates.push_back(error_gates(flight, middle, answers, i));

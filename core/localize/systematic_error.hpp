@@ -17,7 +17,7 @@ struct SystematicErrors {
   ErrorFinding
       step;  ///< what ranges measured in the upper half of the flight's heights are longer by; metres
   ErrorFinding drift;          ///< what ranges grow by from the beginning of the flight to its end; metres
-  ErrorFinding track_drift;    ///< what the track drifts by, along the axis that is known least; metres
+  ErrorFinding track_drift;    ///< what the track drifts by, in the way that is known least; metres
   ErrorFinding track_heights;  ///< factor less one of the heights of the track
   std::vector<std::vector<Gate>> gates;          ///< of each anchor: error_gates
   std::vector<Eigen::Matrix3d> covariance_m2{};  ///< what the region of each anchor is to hold for it beside

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "core/localize/flight_solver.hpp"
 #include "tests/core/localize/flight_support.hpp"
@@ -156,6 +157,21 @@ TEST(SystematicErrors, WithholdEveryAnchorWhereThePositionsDrift) {
       expect_says(gate, drift_m.z() > 0 ? "in height" : drift_m.x() > 0 ? "eastward" : "northward");
       EXPECT_FALSE(anchor.estimate.acceptable());
     }
+  }
+}
+
+TEST(SystematicErrors, WithholdEveryAnchorWhereThePositionsWander) {
+  FlightData flight = make_flight(turning(8));
+  const double from_s = flight.fixes.front().time.seconds(),
+               length_s = flight.fixes.back().time.seconds() - from_s;
+  for (Fix& fix : flight.fixes)
+    fix.local_m.y() += 0.4 * std::cos(2 * std::numbers::pi * (fix.time.seconds() - from_s) / length_s);
+  const FlightSolution solution = solve_flight(flight).value();
+  for (const AnchorSolution& anchor : solution.anchors) {
+    const Gate& gate = gate_named(anchor, "track_drift");
+    EXPECT_FALSE(gate.passed) << gate.why;
+    expect_says(gate, "northward to and fro during the flight");
+    EXPECT_FALSE(anchor.estimate.acceptable());
   }
 }
 
