@@ -147,10 +147,12 @@ Result<std::unique_ptr<Database>> open_postgres(const PostgresOptions& options) 
   BOOST_OUTCOME_TRY(auto folder, sql::DataFolder::open(options.data_dir, 0));
   try {
     std::unique_ptr<ServerLease> lease;
+    std::optional<LeaseWish> wish = options.lease;
+    if (wish) wish->newest_schema = newest_schema_version();
     const bool leased = has_lease(*std::make_unique<PostgresConnection>(options.address));
     // Before the migration: a newer server that stands by leaves the tables as they are until it is its turn.
-    if (options.lease && leased) {
-      BOOST_OUTCOME_TRY(lease, ServerLease::take(options.address, *options.lease));
+    if (wish && leased) {
+      BOOST_OUTCOME_TRY(lease, ServerLease::take(options.address, *wish));
     }
     PostgresConnection connection(options.address);
     BOOST_OUTCOME_TRYV(sql::migrate_postgres(connection, postgresql_migrations(), SystemClock{}.now()));
@@ -164,8 +166,8 @@ Result<std::unique_ptr<Database>> open_postgres(const PostgresOptions& options) 
               " is empty: copy the rows with 'anchord database copy', or give another --data-dir");
     }
     BOOST_OUTCOME_TRYV(folder->note_postgres(sql::shown_address(options.address)));
-    if (options.lease && !lease) {
-      BOOST_OUTCOME_TRY(lease, ServerLease::take(options.address, *options.lease));
+    if (wish && !lease) {
+      BOOST_OUTCOME_TRY(lease, ServerLease::take(options.address, *wish));
     }
     return std::unique_ptr<Database>(
         std::make_unique<PostgresDatabase>(options, std::move(folder), std::move(lease)));

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "server/storage/postgres_connection.hpp"
+#include "server/storage/postgres_migrate.hpp"
 
 namespace anchord {
 namespace {
@@ -65,11 +66,17 @@ namespace {
 
 struct Attempt {
   std::optional<std::int64_t> fence;
+  std::optional<Error> refused;
   std::string holder;
 };
 
 Attempt attempt(PostgresConnection& c, const LeaseWish& wish) {
   Attempt out;
+  // One that cannot use the tables takes no lease, and leaves no mark: the holder would count on it.
+  if (const int version = sql::postgres_version(c); wish.newest_schema > 0 && version > wish.newest_schema) {
+    out.refused = sql::newer_database(version, wish.newest_schema);
+    return out;
+  }
   {
     Query take(c, k_take_lease);
     take << wish.server << ns(wish.lease);
@@ -100,6 +107,7 @@ Result<std::unique_ptr<ServerLease>> ServerLease::take(const std::string& addres
   for (;;) {
     try {
       const auto made = line->run([&](PostgresConnection& c) { return attempt(c, wish); });
+      if (made.refused) return *made.refused;
       if (made.fence)
         return std::unique_ptr<ServerLease>(new ServerLease(std::move(line), std::move(wish), *made.fence));
       if (!wish.standby && SteadyClock::now() > patience) return held_by(made.holder);
