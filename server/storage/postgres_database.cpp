@@ -37,9 +37,12 @@ class PostgresDatabase final : public Database {
                    std::unique_ptr<ServerLease> lease)
       : folder_(std::move(folder)),
         lease_(std::move(lease)),
-        gate_([address = options.address] { return std::make_unique<PostgresConnection>(address); },
-              {options.writers, options.readers, options.max_queued_rows, options.max_queued_calls,
-               options.statement_timeout, lease_ ? lease_->fence() : 0}),
+        gate_(
+            [address = options.address] {
+              return std::make_unique<PostgresConnection>(address, k_server_sessions);
+            },
+            {options.writers, options.readers, options.max_queued_rows, options.max_queued_calls,
+             options.statement_timeout, lease_ ? lease_->fence() : 0}),
         // The disk is the database server's: whether a mission still fits, it says when it does not.
         kept_(
             gate_, [] { return std::optional<Error>{}; }, sql::CirFolder(folder_->cir_archive())),

@@ -14,6 +14,9 @@
 
 namespace anchord {
 
+/// Name of the sessions in which a server with a lease reads and writes.
+inline constexpr const char* k_server_sessions = "anchord server";
+
 /// How a server wants to have a PostgreSQL database.
 struct LeaseWish {
   std::string server;   ///< its name, for people

@@ -62,10 +62,12 @@ class PostgresLease : public testing::Test {
     return lease ? std::move(lease).value() : nullptr;
   }
   /// A write of the server whose lease has this number, or had it.
-  std::optional<Error> write(std::int64_t fence) const {
-    PostgresGate gate([this] { return std::make_unique<PostgresConnection>(address()); },
+  std::optional<Error> write(
+      std::int64_t fence, const std::function<void()>& in_the_middle = [] {}) const {
+    PostgresGate gate([this] { return std::make_unique<PostgresConnection>(address(), k_server_sessions); },
                       {1, 1, 10, 10, std::chrono::seconds(30), fence});
-    return gate.write(1, [](sql::Connection& c) -> std::optional<Error> {
+    return gate.write(1, [&](sql::Connection& c) -> std::optional<Error> {
+      in_the_middle();
       sql::Query(c,
                  "INSERT INTO token (id, name, secret_sha256_hex, created_t_ns) VALUES "
                  "(uuid_send(gen_random_uuid()), 'of a test', CAST(gen_random_uuid() AS TEXT), 0)")
@@ -150,6 +152,29 @@ TEST_F(PostgresLease, AnOlderProgramThatWasTakenOverFromStoresNothingInTheNewerT
   EXPECT_EQ(refused->code, Errc::storage_unavailable);
   EXPECT_THAT(refused->message, HasSubstr("another server has taken over this database"));
   EXPECT_EQ(rows(), 1);
+}
+
+TEST_F(PostgresLease, AWriteThatWasUnderWayWhenItsServerWasTakenOverFromIsUndone) {
+  // Suspended in the middle of a transaction whose fence was right when it began.
+  PostgresConnection(address()).execute(
+      "INSERT INTO server_lease (one, server, fence, lease_t_ns, standby, standby_t_ns) VALUES "
+      "(1, 'suspended', 7, 1, '', 0)");
+  std::unique_ptr<ServerLease> next;
+  const auto undone = write(7, [&] { next = taken("next", newest()); });
+  ASSERT_NE(next, nullptr);
+  ASSERT_TRUE(undone);
+  EXPECT_EQ(undone->code, Errc::storage_unavailable);
+  EXPECT_EQ(rows(), 0);
+  EXPECT_FALSE(write(next->fence()));
+}
+
+TEST_F(PostgresLease, ATakeOverCutsOffNobodyElse) {
+  PostgresConnection reader(address());
+  reader.execute("BEGIN ISOLATION LEVEL REPEATABLE READ READ ONLY; SELECT count(*) FROM token");
+  const auto next = taken("next", newest());
+  ASSERT_NE(next, nullptr);
+  reader.execute("SELECT count(*) FROM token; COMMIT");
+  EXPECT_TRUE(reader.usable());
 }
 
 TEST_F(PostgresLease, AnOlderProgramIsRefusedWhereTheTablesAreNewerAndIsNotCountedAsAStandby) {
