@@ -33,10 +33,11 @@ export const range = (mission, extra) => {
     `"rss_dbm":-84.3,"fp_dbm":-86.1,"rx_dbm":-82.7,"seq":${seq},"mission":"${mission}"${extra}}\n`
   );
 };
+/** Ten a second of an aircraft that hovers: one that jumped would be work for the live track, which is not what is measured. */
 export const fix = (mission) => {
   const seq = sequence++;
   return (
-    `{"t_us":${1777889472000000 + seq * 100},"lon":3.7131,"lat":51.0231,"h_m":${60 + (seq % 100) / 100},"fix":"fixed","seq":${seq},` +
+    `{"t_us":${1777889472000000 + seq * 100_000},"lon":3.7131,"lat":51.0231,"h_m":${60 + (seq % 10) / 1000},"fix":"fixed","seq":${seq},` +
     `"sigma_m":[0.01,0.01,0.02],"q":[0,0,0,1],"mission":"${mission}"}\n`
   );
 };
