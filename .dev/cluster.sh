@@ -1,4 +1,4 @@
-# cmd_cluster: a cell on loopback and without containers: PostgreSQL, two servers that stand by for one another, a
+# cmd_cluster: what docs/scale.md calls a cell, on loopback and without containers: PostgreSQL, two servers that stand by for one another, a
 # worker with the rights of docs/workers.md, HAProxy by docs/examples/haproxy.cfg and, where it is installed, Prometheus by docs/monitoring.
 # This script stands in for the service managers: a server or worker that ends is started again.
 cluster_dir=${ANCHORD_CLUSTER_DIR:-$PWD/build/cluster}
