@@ -5,7 +5,7 @@ cmd_bench() {
   install_packages test bench
   ensure_node
   ensure_test_packages
-  if [[ ${1:-} == soak || ${1:-} == exports || ${1:-} == calibrate ]]; then
+  if [[ ${1:-} == soak || ${1:-} == exports || ${1:-} == calibrate || ${1:-} == cluster ]]; then
     local what=$1
     shift
     build_preset release anchord

@@ -112,6 +112,8 @@ constexpr std::array k_gate_words{
     GateWords{"range_scale", "Scale error of the ranges", "%"},
     GateWords{"range_step", "Step of the ranges between low and high", "m"},
     GateWords{"range_drift", "Drift of the ranges over the flight", "m"},
+    GateWords{"track_drift", "Drift of the positions over the flight", "m"},
+    GateWords{"track_heights", "Factor on the heights of the track", "%"},
     GateWords{"track_shift", "No shift of the track at its gaps", "χ²"},
     GateWords{"track", "Positions shifted together against the others", "%"},
     GateWords{"profile", "The kit agrees with its other flights", "χ²"},

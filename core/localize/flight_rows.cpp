@@ -10,6 +10,9 @@
 namespace anchord {
 namespace {
 
+constexpr double k_arm_across_m = 0.01;
+constexpr double k_still_s = 30, k_still_rad = 1e-4;
+
 /// Word under which a range is refused before any geometry, or empty.
 std::string refusal(const FlightRange& range, const FlightOptions& options) {
   if (!std::isfinite(range.distance_m)) return "not_finite";
@@ -62,11 +65,35 @@ Result<std::optional<EnuFrame>> frame_of(const std::optional<Wgs84>& centre, con
   return std::optional(frame);
 }
 
+bool has_arm_across(const FlightData& flight) {
+  return std::ranges::any_of(flight.mission.tags, [](const auto& tag) {
+    return tag.lever_arm_body_m.template head<2>().norm() > k_arm_across_m;
+  });
+}
+
+/// Does the heading stay the same to the last digit, as no compass has it? Where one stands still so, the
+/// aircraft may have turned all the same.
+bool heading_stands_still(const std::vector<Fix>& fixes) {
+  if (fixes.empty() || seconds_between(fixes.front().time, fixes.back().time) < k_still_s) return false;
+  const auto forward = [](const Fix& fix) -> Eigen::Vector2d {
+    return (*fix.enu_from_body * Eigen::Vector3d::UnitX()).head<2>().normalized();
+  };
+  return std::ranges::all_of(fixes, [&](const Fix& fix) {
+    return fix.enu_from_body && (forward(fix) - forward(fixes.front())).norm() < k_still_rad;
+  });
+}
+
+/// A heading that stands still is not taken for one, where an arm would be turned by it.
+void drop_still_heading(const FlightData& flight, std::vector<Fix>& fixes, std::vector<std::string>& notes) {
+  if (!has_arm_across(flight) || !heading_stands_still(fixes)) return;
+  for (Fix& fix : fixes) fix.enu_from_body.reset();
+  notes.emplace_back(
+      "the heading of the track is the same in all positions, to the last digit: it is taken as not "
+      "measured");
+}
+
 void note_track(const FlightData& flight, const std::vector<std::string>& notes, FlightRows& rows) {
-  bool arm_across = false;
-  for (const auto& tag : flight.mission.tags)
-    arm_across = arm_across || tag.lever_arm_body_m.head<2>().norm() > 0.01;
-  if (arm_across && !rows.track.has_attitude()) {
+  if (has_arm_across(flight) && !rows.track.has_attitude()) {
     rows.notes.emplace_back("the track has no attitude: only the upward part of the lever arms is applied");
   }
   rows.notes.insert(rows.notes.end(), notes.begin(), notes.end());
@@ -168,6 +195,7 @@ Result<FlightRows> flight_rows(const FlightData& flight, const FlightOptions& op
   if (flight.n_ranges() == 0) return make_error(Errc::too_few_observations, "no ranges");
   BOOST_OUTCOME_TRY(const auto frame,
                     frame_of(kind == TrackFrame::wgs84 ? checked.centre : std::nullopt, options));
+  drop_still_heading(flight, fixes, checked.notes);
   const UtcTime epoch = fixes.front().time;
   FlightRows rows{epoch,
                   frame,

@@ -16,8 +16,7 @@ namespace {
 constexpr double k_near_m = 5.0;        // below, ranges of real radios have a slope of their own,
 constexpr double k_near_right_m = 2.5;  // right at about this distance,
 constexpr double k_near_prior = 0.06;   // by so many metres a metre, one sigma
-constexpr double k_failing_z = 4.0;
-constexpr double k_odd_z = 1.5;  // worth another solve
+constexpr double k_odd_z = 1.5;         // worth another solve
 constexpr std::size_t k_most_again = 3;
 constexpr int k_rounds = 3;
 constexpr double k_wide_scales = 3;         // beyond, a residual counts less: a factor makes them large
@@ -25,110 +24,17 @@ constexpr double k_imitated_bias_m = 0.15;  // no factor is shown by ranges that
 // As of a shift of the track.
 constexpr double k_doubted_chi2 = 3, k_believed_chi2 = 9;
 
-/// What is known of a kind of error before the ranges are asked.
-struct Kind {
-  double prior;    ///< one sigma
-  double failing;  ///< less moves no anchor out of its region
-  double chance;   ///< of a flight to have one
-};
-// 2 to 10 % are what wrong clocks and units do.
-constexpr Kind k_factor_of_all{0.05, 0.005, 0.07}, k_factor_of_some{0.05, 0.005, 0.05};
-constexpr Kind k_height_step{0.3, 0.10, 0.02}, k_drift{0.3, 0.10, 0.02};
-
 // One range in the normal equations: by_anchor, by_shared, slope of near ranges, what is asked, residual.
-constexpr int k_own = 4, k_near = k_shared_size, k_asked = k_near + 1, k_residual = k_asked + 3,
+constexpr int k_errors = static_cast<int>(k_error_columns);
+constexpr int k_own = 4, k_near = k_shared_size, k_asked = k_near + 1, k_residual = k_asked + k_errors,
               k_rest = k_residual + 1;
 using Sums = Eigen::Matrix<double, k_own + k_rest, k_own + k_rest>;
 using Rest = Eigen::Matrix<double, k_rest, k_rest>;
 using Coupling = Eigen::Matrix<double, k_own, k_rest>;
 
-/// Errors that are asked for, in the order of their columns.
-enum class ErrorKind : std::uint8_t { factor, step, drift };
-
-/// An error and the ranges that may have it: all, or those of one antenna, or of one anchor.
-struct Question {
-  ErrorKind kind{ErrorKind::factor};
-  std::optional<std::size_t> antenna{}, anchor{};
-  bool all() const { return !anchor && !antenna; }
-  bool has(std::size_t of_anchor, std::size_t of_antenna) const {
-    return (!anchor || *anchor == of_anchor) && (!antenna || *antenna == of_antenna);
-  }
-  const Kind& known() const {
-    switch (kind) {
-      case ErrorKind::step:
-        return k_height_step;
-      case ErrorKind::drift:
-        return k_drift;
-      case ErrorKind::factor:
-        break;
-    }
-    return all() ? k_factor_of_all : k_factor_of_some;
-  }
-};
-
-std::size_t antenna_of(const FlightRows& flight, const JointRow& row) {
-  const auto at = std::ranges::find_if(flight.antennas, [&](const FlightAntenna& one) {
-    return one.tag == row.tag && one.antenna == row.antenna;
-  });
-  return static_cast<std::size_t>(at - flight.antennas.begin());
-}
-
-/// Where the flight's halves meet.
-struct Middle {
-  double up_m{};  ///< of the antennas, median over the ranges
-  double from_s{}, length_s{};
-};
-
-Middle middle_of(const FlightRows& flight, const JointState& state) {
-  std::vector<double> ups_m;
-  double from_s = std::numeric_limits<double>::infinity(), to_s = -from_s;
-  for (std::size_t i = 0; i < flight.anchors.size(); ++i) {
-    if (!state.anchors[i].active) continue;
-    const JointLines lines(flight.track, flight.anchors[i].rows, state.shared, state.anchors[i]);
-    const auto of_rows_m = lines.of(JointLines::antenna_z);
-    ups_m.insert(ups_m.end(), of_rows_m.begin(), of_rows_m.end());
-    for (const JointRow* row : lines.rows()) {
-      from_s = std::min(from_s, row->t_s);
-      to_s = std::max(to_s, row->t_s);
-    }
-  }
-  if (ups_m.empty()) return {};
-  const auto half = ups_m.begin() + static_cast<std::ptrdiff_t>(ups_m.size() / 2);
-  std::ranges::nth_element(ups_m, half);
-  return {*half, from_s, std::max(to_s - from_s, 1.0)};
-}
-
-/// What one unit of each error adds to a range: metres a unit.
-struct Columns {
-  double by[3]{};
-  double of(ErrorKind kind) const { return by[static_cast<int>(kind)]; }
-};
-
-Columns columns_of(const Middle& middle, const JointRow& row, double antenna_up_m, double distance_m) {
-  return {{distance_m, antenna_up_m > middle.up_m ? 1.0 : 0.0, (row.t_s - middle.from_s) / middle.length_s}};
-}
-
-std::vector<Question> questions_of(const FlightRows& flight, const JointFit& fit) {
-  std::vector<Question> questions{{ErrorKind::factor}, {ErrorKind::step}, {ErrorKind::drift}};
-  for (std::size_t k = 0; flight.antennas.size() > 1 && k < flight.antennas.size(); ++k)
-    questions.push_back({.antenna = k});
-  for (std::size_t i = 0; i < flight.anchors.size(); ++i)
-    if (fit.state.anchors[i].active) questions.push_back({.anchor = i});
-  return questions;
-}
-
 /// How residuals count: as in the fit, or large ones less, but all of them: what an error makes of ranges the
 /// fit may have taken for outliers.
 enum class Weighing : std::uint8_t { as_fitted, wide };
-
-/// What the flight says about one question.
-struct Answer {
-  Question question;
-  ErrorFinding found;
-  std::vector<Eigen::Vector3d>
-      moved{};     ///< how the anchors of the fit, which has no such error, follow it; metres a unit
-  double doubt{};  ///< 0..1: how much of it the regions hold
-};
 
 /// The normal equations of a fit, to ask them for errors.
 class ErrorTest {
@@ -138,11 +44,11 @@ class ErrorTest {
     const JointFit& fit;
     const SharedPrior& prior;
     const FlightOptions& options;
-    const Middle& middle;
+    const FlightMiddle& middle;
   };
   ErrorTest(const Given& given, Weighing weighing);
   /// since  what the rows were corrected by already: the prior is about the whole
-  Answer ask(const Question& question, double since = 0) const;
+  ErrorAnswer ask(const ErrorQuestion& question, double since = 0) const;
 
  private:
   struct Anchor {
@@ -151,7 +57,7 @@ class ErrorTest {
     Eigen::Vector4d prior_gradient{Eigen::Vector4d::Zero()};
   };
   Anchor anchor_of(std::size_t index, Weighing weighing) const;
-  Sums sums_of(std::size_t anchor, const Question& question) const;
+  Sums sums_of(std::size_t anchor, const ErrorQuestion& question) const;
 
   Given given_;
   std::vector<Anchor> anchors_;
@@ -167,15 +73,12 @@ double weight_per_m2(const WeighedRow& by, const JointRow& row, const JointLine&
 
 /// Columns of Sums beside those of the lines, and weights: 0 in whole groups of four beyond the rows.
 struct AskedColumns {
-  std::vector<double> ones, near, factor, step, drift, residual, weight;
+  std::vector<double> ones, near, residual, weight;
+  std::array<std::vector<double>, k_error_columns> asked;
   explicit AskedColumns(std::size_t padded)
-      : ones(padded, 1.0),
-        near(padded),
-        factor(padded),
-        step(padded),
-        drift(padded),
-        residual(padded),
-        weight(padded) {}
+      : ones(padded, 1.0), near(padded), residual(padded), weight(padded) {
+    asked.fill(std::vector<double>(padded));
+  }
 };
 
 AskedColumns asked_columns(const ErrorTest::Given& given, std::size_t index, const JointLines& lines,
@@ -193,12 +96,10 @@ AskedColumns asked_columns(const ErrorTest::Given& given, std::size_t index, con
     if (!(weight > 0)) continue;
     const Eigen::Vector3d antenna_m(lines.of(JointLines::antenna_x)[i], lines.of(JointLines::antenna_y)[i],
                                     lines.of(JointLines::antenna_z)[i]);
-    const double distance_m = (antenna_m - anchor_m).norm();
-    const Columns asked = columns_of(given.middle, row, antenna_m.z(), distance_m);
-    out.near[i] = std::min(distance_m, k_near_m) - k_near_right_m;
-    out.factor[i] = asked.of(ErrorKind::factor);
-    out.step[i] = asked.of(ErrorKind::step);
-    out.drift[i] = asked.of(ErrorKind::drift);
+    const Eigen::Vector3d to_anchor_m = anchor_m - antenna_m;
+    const ErrorColumns columns = error_columns(given.middle, row.t_s, antenna_m.z(), to_anchor_m);
+    for (std::size_t k = 0; k < k_error_columns; ++k) out.asked[k][i] = columns[k];
+    out.near[i] = std::min(to_anchor_m.norm(), k_near_m) - k_near_right_m;
     out.residual[i] = by.residual_m;
     out.weight[i] = weight;
   }
@@ -209,11 +110,13 @@ AskedColumns asked_columns(const ErrorTest::Given& given, std::size_t index, con
 Sums sums_of_antenna(const JointLines& lines, const AskedColumns& columns, std::span<const double> weights,
                      const std::optional<std::int8_t>& arm) {
   using L = JointLines;
-  const std::array<const double*, 14> distinct{
-      lines.begin(L::x),     lines.begin(L::y),      lines.begin(L::z),     columns.ones.data(),
-      lines.begin(L::curve), lines.begin(L::lag),    lines.begin(L::lever), lines.begin(L::forward),
-      lines.begin(L::left),  columns.near.data(),    columns.factor.data(), columns.step.data(),
-      columns.drift.data(),  columns.residual.data()};
+  constexpr std::size_t k_of_lines = 9, k_distinct = k_of_lines + 1 + k_error_columns + 1;
+  std::array<const double*, k_distinct> distinct{
+      lines.begin(L::x),     lines.begin(L::y),   lines.begin(L::z),     columns.ones.data(),
+      lines.begin(L::curve), lines.begin(L::lag), lines.begin(L::lever), lines.begin(L::forward),
+      lines.begin(L::left),  columns.near.data()};
+  for (std::size_t k = 0; k < k_error_columns; ++k) distinct[k_of_lines + 1 + k] = columns.asked[k].data();
+  distinct.back() = columns.residual.data();
   constexpr int ones = 3, lever = 6;
   // Of each column of Sums, among those; -1: nothing.
   std::array<int, k_own + k_rest> from{0, 1, 2, ones, ones, 4, 5, lever, 7, 8};
@@ -222,7 +125,8 @@ Sums sums_of_antenna(const JointLines& lines, const AskedColumns& columns, std::
   for (int i = k_own + k_shared_antennas; i < k_own + k_shared_size; ++i)
     from[static_cast<std::size_t>(i)] = -1;
   if (arm) from[static_cast<std::size_t>(k_own + k_shared_antennas + *arm)] = lever;
-  for (int i = 0; i < 5; ++i) from[static_cast<std::size_t>(k_own + k_near + i)] = 9 + i;
+  for (std::size_t i = 0; k_of_lines + i < k_distinct; ++i)
+    from[k_own + k_near + i] = static_cast<int>(k_of_lines + i);
   const std::vector<double> products = weighted_products(distinct, weights);
   Sums out = Sums::Zero();
   for (int i = 0; i < k_own + k_rest; ++i)
@@ -267,8 +171,8 @@ ErrorTest::ErrorTest(const Given& given, Weighing weighing) : given_(given) {
 
 /// Of one anchor, with the column of the question where the first of those asked is; where the question has
 /// no part, nothing stands there.
-Sums ErrorTest::sums_of(std::size_t anchor, const Question& question) const {
-  const int column = k_own + k_asked, asked = column + static_cast<int>(question.kind);
+Sums ErrorTest::sums_of(std::size_t anchor, const ErrorQuestion& question) const {
+  const int column = k_own + k_asked, asked = column + static_cast<int>(question.column);
   Sums all = Sums::Zero();
   for (std::size_t k = 0; k < anchors_[anchor].by_antenna.size(); ++k) {
     Sums sums = anchors_[anchor].by_antenna[k];
@@ -291,7 +195,7 @@ SharedPrior with_open_bias(SharedPrior prior) {
   return prior;
 }
 
-Answer ErrorTest::ask(const Question& question, double since) const {
+ErrorAnswer ErrorTest::ask(const ErrorQuestion& question, double since) const {
   const SharedPrior prior = with_open_bias(given_.prior);
   Rest rest = Rest::Zero();
   std::vector<Coupling> couplings;
@@ -313,7 +217,7 @@ Answer ErrorTest::ask(const Question& question, double since) const {
   const double score =
       rest(k_asked, k_residual) - followed.dot(rest.block<k_asked, 1>(0, k_residual)) + information * since;
   const double with_prior = information + 1.0 / (question.known().prior * question.known().prior);
-  Answer out;
+  ErrorAnswer out;
   out.question = question;
   out.found = {score / with_prior, 1.0 / std::sqrt(with_prior), score / std::sqrt(with_prior)};
   // The fit followed the error with the prior it has, and without a slope.
@@ -327,25 +231,26 @@ Answer ErrorTest::ask(const Question& question, double since) const {
   return out;
 }
 
-FlightRows corrected(const ErrorTest::Given& given, const Question& question, double value) {
+FlightRows corrected(const ErrorTest::Given& given, const ErrorQuestion& question, double value) {
   FlightRows out = given.flight;
   for (std::size_t i = 0; i < out.anchors.size(); ++i) {
     for (JointRow& row : out.anchors[i].rows) {
       if (!question.has(i, antenna_of(given.flight, row))) continue;
-      if (question.kind == ErrorKind::factor) {
+      if (question.kind() == ErrorKind::factor) {
         row.distance_m /= 1.0 + value;
         continue;
       }
-      const JointLine line =
-          linearise(given.flight.track, row, given.fit.state.shared, given.fit.state.anchors[i]);
-      row.distance_m -= value * columns_of(given.middle, row, line.antenna_m.z(), 0).of(question.kind);
+      const JointState::Anchor& anchor = given.fit.state.anchors[i];
+      const JointLine line = linearise(given.flight.track, row, given.fit.state.shared, anchor);
+      row.distance_m -= value * error_columns(given.middle, row.t_s, line.antenna_m.z(),
+                                              anchor.position_m - line.antenna_m)[question.column];
     }
   }
   return out;
 }
 
 /// With everything else, from ranges that the error found so far is taken off.
-Result<void> ask_again(const ErrorTest::Given& given, double first, Answer& answer) {
+Result<void> ask_again(const ErrorTest::Given& given, double first, ErrorAnswer& answer) {
   JointState state = given.fit.state;
   ErrorFinding found = answer.found;
   found.value = first;
@@ -363,17 +268,17 @@ Result<void> ask_again(const ErrorTest::Given& given, double first, Answer& answ
   return boost::outcome_v2::success();
 }
 
-/// The first three are of all ranges, in the order of ErrorKind.
-Result<std::vector<Answer>> answers_of(const ErrorTest::Given& given) {
+/// The first are of all ranges, in the order of their columns.
+Result<std::vector<ErrorAnswer>> answers_of(const ErrorTest::Given& given) {
   const ErrorTest fitted(given, Weighing::as_fitted), wide(given, Weighing::wide);
-  std::vector<Answer> answers;
+  std::vector<ErrorAnswer> answers;
   struct Odd {
     double z{}, first{};
     std::size_t index{};
   };
   std::vector<Odd> odd;
-  for (const Question& question : questions_of(given.flight, given.fit)) {
-    const Answer& answer = answers.emplace_back(fitted.ask(question));
+  for (const ErrorQuestion& question : error_questions(given.flight, given.fit)) {
+    const ErrorAnswer& answer = answers.emplace_back(fitted.ask(question));
     const ErrorFinding wider = wide.ask(question).found;
     const ErrorFinding& odder = std::abs(wider.z) > std::abs(answer.found.z) ? wider : answer.found;
     odd.push_back({std::abs(odder.z), odder.value, answers.size() - 1});
@@ -387,28 +292,22 @@ Result<std::vector<Answer>> answers_of(const ErrorTest::Given& given) {
   return answers;
 }
 
-/// What fails: beyond doubt, and large enough to matter.
-double limit_of(const Answer& answer) {
-  return std::max(answer.question.known().failing, k_failing_z * answer.found.sigma);
-}
-double over_limit(const Answer& answer) { return std::abs(answer.found.value) / limit_of(answer); }
-
 /// How much of every error the regions hold: the chance that it is there, or more where the ranges come near
 /// to showing it.
-void find_doubts(std::vector<Answer>& answers) {
+void find_doubts(std::vector<ErrorAnswer>& answers) {
   const double n = static_cast<double>(answers.size());
   const double n_some = static_cast<double>(
-      std::ranges::count_if(answers, [](const Answer& one) { return !one.question.all(); }));
-  double sum = 1.0 - k_factor_of_all.chance - k_factor_of_some.chance - k_height_step.chance - k_drift.chance;
-  for (Answer& answer : answers) {
-    const Kind& known = answer.question.known();
+      std::ranges::count_if(answers, [](const ErrorAnswer& one) { return !one.question.all(); }));
+  double sum = chance_of_no_error();
+  for (ErrorAnswer& answer : answers) {
+    const KnownError& known = answer.question.known();
     const double before = answer.question.all() ? known.chance : known.chance / n_some;
     // Likelihood with the error over that without; no exponential overflows.
     const double chi2 = answer.found.z * answer.found.z;
     answer.doubt = before * answer.found.sigma / known.prior * std::exp(0.5 * std::min(chi2, 200.0));
     sum += answer.doubt;
   }
-  for (Answer& answer : answers) {
+  for (ErrorAnswer& answer : answers) {
     const double chi2 = answer.found.z * answer.found.z;
     const double near =
         std::clamp((chi2 - k_doubted_chi2 - 2 * std::log(n)) / (k_believed_chi2 - k_doubted_chi2), 0.0, 1.0);
@@ -416,100 +315,10 @@ void find_doubts(std::vector<Answer>& answers) {
   }
 }
 
-std::string whose(const FlightRows& flight, const Question& question) {
-  if (question.antenna) {
-    const FlightAntenna& of = flight.antennas[*question.antenna];
-    return "to antenna " + std::to_string(of.antenna) + " of tag " + to_string(of.tag);
-  }
-  return question.anchor ? "of this anchor" : "all ranges";
-}
-
-std::string why_factor(const FlightRows& flight, const Answer& worst) {
-  const ErrorFinding& found = worst.found;
-  char text[400];
-  if (over_limit(worst) <= 1)
-    std::snprintf(text, sizeof text,
-                  "no scale error of the ranges is seen: %s %+.2f %% with sigma %.2f %% (%.1f sigma)",
-                  whose(flight, worst.question).c_str(), 100 * found.value, 100 * found.sigma,
-                  std::abs(found.z));
-  else
-    std::snprintf(
-        text, sizeof text,
-        "the ranges are too %s by a factor (%s): %.4f with sigma %.4f (%.1f sigma); check the unit of "
-        "the ranges, the clock and the delay settings of the radios, correct the ranges and solve "
-        "again",
-        found.value > 0 ? "long" : "short", whose(flight, worst.question).c_str(), 1 + found.value,
-        found.sigma, std::abs(found.z));
-  return text;
-}
-
-std::string why_step(const Middle& middle, const Answer& answer) {
-  const ErrorFinding& found = answer.found;
-  char text[400];
-  if (over_limit(answer) <= 1)
-    std::snprintf(
-        text, sizeof text,
-        "no step of the ranges between low and high is seen: %+.3f m with sigma %.3f m (%.1f sigma)",
-        found.value, found.sigma, std::abs(found.z));
-  else
-    std::snprintf(
-        text, sizeof text,
-        "ranges measured above %.1f m (over the origin) are %.2f m too %s against those below, with "
-        "sigma %.2f m (%.1f sigma): a reflection or the antenna; fly with the tag mounted "
-        "otherwise, or exclude the ranges of one half",
-        middle.up_m, std::abs(found.value), found.value > 0 ? "long" : "short", found.sigma,
-        std::abs(found.z));
-  return text;
-}
-
-std::string why_drift(const Answer& answer) {
-  const ErrorFinding& found = answer.found;
-  char text[400];
-  if (over_limit(answer) <= 1)
-    std::snprintf(text, sizeof text,
-                  "no drift of the ranges in time is seen: %+.3f m over the flight with sigma %.3f m (%.1f "
-                  "sigma)",
-                  found.value, found.sigma, std::abs(found.z));
-  else
-    std::snprintf(text, sizeof text,
-                  "the ranges %s by %.2f m over the flight with sigma %.2f m (%.1f sigma): a radio that was "
-                  "not warm, or a clock; let the tag run for ten minutes and fly again",
-                  found.value > 0 ? "grow" : "shrink", std::abs(found.value), found.sigma, std::abs(found.z));
-  return text;
-}
-
-/// The factor that speaks most against the anchor; the step; the drift.
-std::vector<Gate> gates_of(const FlightRows& flight, const Middle& middle, const std::vector<Answer>& answers,
-                           std::size_t anchor) {
-  const Answer* worst = nullptr;
-  std::vector<Gate> gates(1);
-  for (const Answer& answer : answers) {
-    const auto gate = [&](const char* name, std::string why) {
-      return Gate{name, std::abs(answer.found.value), limit_of(answer), over_limit(answer) <= 1,
-                  std::move(why)};
-    };
-    switch (answer.question.kind) {
-      case ErrorKind::step:
-        gates.push_back(gate("range_step", why_step(middle, answer)));
-        break;
-      case ErrorKind::drift:
-        gates.push_back(gate("range_drift", why_drift(answer)));
-        break;
-      case ErrorKind::factor:
-        if (answer.question.anchor && *answer.question.anchor != anchor) break;
-        if (worst && over_limit(answer) <= over_limit(*worst)) break;
-        worst = &answer;
-        gates.front() = gate("range_scale", why_factor(flight, answer));
-        break;
-    }
-  }
-  return gates;
-}
-
 /// Mean square of what an anchor is off by the errors there may be.
-Eigen::Matrix4d off_m2(const std::vector<Answer>& answers, std::size_t anchor, Dims dims) {
+Eigen::Matrix4d off_m2(const std::vector<ErrorAnswer>& answers, std::size_t anchor, Dims dims) {
   Eigen::Matrix4d out = Eigen::Matrix4d::Zero();
-  for (const Answer& answer : answers) {
+  for (const ErrorAnswer& answer : answers) {
     const double square = answer.found.value * answer.found.value + answer.found.sigma * answer.found.sigma;
     const Eigen::Vector3d& moved = answer.moved[anchor];
     out.topLeftCorner<3, 3>() += answer.doubt * square * moved * moved.transpose();
@@ -525,17 +334,21 @@ Eigen::Matrix4d off_m2(const std::vector<Answer>& answers, std::size_t anchor, D
 
 Result<SystematicErrors> check_systematic_errors(const FlightRows& flight, const JointFit& fit,
                                                  const SharedPrior& prior, const FlightOptions& options) {
-  const Middle middle = middle_of(flight, fit.state);
+  const FlightMiddle middle = middle_of(flight, fit.state);
   const ErrorTest::Given given{flight, fit, prior, options, middle};
   BOOST_OUTCOME_TRY(auto answers, answers_of(given));
   find_doubts(answers);
   SystematicErrors out;
-  out.scale = answers[0].found;
-  out.step = answers[1].found;
-  out.drift = answers[2].found;
+  const auto found = [&](ErrorKind kind) { return answers[static_cast<std::size_t>(kind)].found; };
+  out.scale = found(ErrorKind::factor);
+  out.step = found(ErrorKind::step);
+  out.drift = found(ErrorKind::drift);
+  out.track_heights = found(ErrorKind::track_heights);
+  for (std::size_t k = k_track_columns; k < k_error_columns; ++k)
+    if (answers[k].found.sigma > out.track_drift.sigma) out.track_drift = answers[k].found;
   std::size_t n_wider = 0;
   for (std::size_t i = 0; i < flight.anchors.size(); ++i) {
-    out.gates.push_back(gates_of(flight, middle, answers, i));
+    out.gates.push_back(error_gates(flight, middle, answers, i));
     const Eigen::Matrix4d doubt_m2 = off_m2(answers, i, options.dims);
     const Eigen::Matrix4d& before_m2 = fit.anchor_covariance[i];
     n_wider +=
@@ -546,10 +359,11 @@ Result<SystematicErrors> check_systematic_errors(const FlightRows& flight, const
     char text[400];
     std::snprintf(
         text, sizeof text,
-        "%zu of %zu anchors are less accurate because of possible systematic errors of the ranges, "
-        "which this flight determines only so well: scale %.1f %%, step between low and high %.2f m, "
-        "drift over the flight %.2f m (one sigma)",
-        n_wider, flight.anchors.size(), 100 * out.scale.sigma, out.step.sigma, out.drift.sigma);
+        "%zu of %zu anchors are less accurate because of possible systematic errors, which this flight "
+        "determines only so well: of the ranges scale %.1f %%, step between low and high %.2f m, drift over "
+        "the flight %.2f m; of the track drift %.2f m, heights %.1f %% (one sigma)",
+        n_wider, flight.anchors.size(), 100 * out.scale.sigma, out.step.sigma, out.drift.sigma,
+        out.track_drift.sigma, 100 * out.track_heights.sigma);
     out.note = text;
   }
   return out;

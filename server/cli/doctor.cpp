@@ -36,7 +36,6 @@ using Json = nlohmann::json;
 constexpr double k_gb = 1e9;
 constexpr double k_least_free_gb = 1, k_wanted_free_gb = 5;  ///< below 1 GB the checklist forbids to fly
 constexpr std::uint64_t k_least_files = 1024;
-constexpr double k_worker_silent_s = 60;
 
 std::string number(double value, int decimals = 1) {
   char text[32];

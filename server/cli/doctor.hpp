@@ -9,6 +9,9 @@
 
 namespace anchord::cli {
 
+/// A worker of a database that was not seen for so long is not in order.
+inline constexpr double k_worker_silent_s = 60;
+
 /// One thing looked at, what was seen, and what to do about it.
 struct Finding {
   enum class Level : std::uint8_t { ok, warning, failed };

@@ -271,7 +271,7 @@ struct TextHash {
 };
 
 /// The address may say otherwise: it stands behind these.
-PGconn* connect(const std::string& address) {
+PGconn* connect(const std::string& address, const char* name) {
   constexpr std::array keywords{"connect_timeout",
                                 "tcp_user_timeout",
                                 "keepalives_idle",
@@ -282,7 +282,7 @@ PGconn* connect(const std::string& address) {
                                 "client_encoding",
                                 static_cast<const char*>(nullptr)};
   const std::array values{
-      "5", "10000", "10", "5", "3", "anchord", address.c_str(), "UTF8", static_cast<const char*>(nullptr)};
+      "5", "10000", "10", "5", "3", name, address.c_str(), "UTF8", static_cast<const char*>(nullptr)};
   static_assert(keywords.size() == std::tuple_size_v<decltype(values)>);
   return PQconnectdbParams(keywords.data(), values.data(), 1);
 }
@@ -290,15 +290,15 @@ PGconn* connect(const std::string& address) {
 }  // namespace
 
 struct PostgresConnection::State {
-  explicit State(const std::string& address) : connection(connect(address)) {}
+  State(const std::string& address, const char* name) : connection(connect(address, name)) {}
   PGconn* get() const { return connection.get(); }
   std::unique_ptr<PGconn, Finish> connection;
   Parsed parsed;
   std::unordered_map<std::string, std::unique_ptr<PostgresStatement>, TextHash, std::equal_to<>> statements;
 };
 
-PostgresConnection::PostgresConnection(const std::string& address)
-    : state_(std::make_unique<State>(address)) {
+PostgresConnection::PostgresConnection(const std::string& address, const char* name)
+    : state_(std::make_unique<State>(address, name)) {
   PGconn* const c = state_->get();
   if (c == nullptr) throw SqlError(Failure::unavailable, "database: no memory for a connection");
   const std::string where = "database " + shown_address(address) + ": ";

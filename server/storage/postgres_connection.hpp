@@ -14,8 +14,8 @@ class PostgresArrays;
 /// before its first row is read.
 class PostgresConnection final : public Connection {
  public:
-  /// Blocks at most some seconds. Throws SqlError.
-  explicit PostgresConnection(const std::string& address);
+  /// Blocks at most some seconds. Throws SqlError. name: of the session, where the address gives none
+  explicit PostgresConnection(const std::string& address, const char* name = "anchord");
   ~PostgresConnection() override;
 
   Statement& prepared(std::string_view sql) override;

@@ -37,9 +37,12 @@ class PostgresDatabase final : public Database {
                    std::unique_ptr<ServerLease> lease)
       : folder_(std::move(folder)),
         lease_(std::move(lease)),
-        gate_([address = options.address] { return std::make_unique<PostgresConnection>(address); },
-              {options.writers, options.readers, options.max_queued_rows, options.max_queued_calls,
-               options.statement_timeout, lease_ ? lease_->fence() : 0}),
+        gate_(
+            [address = options.address] {
+              return std::make_unique<PostgresConnection>(address, k_server_sessions);
+            },
+            {options.writers, options.readers, options.max_queued_rows, options.max_queued_calls,
+             options.statement_timeout, lease_ ? lease_->fence() : 0}),
         // The disk is the database server's: whether a mission still fits, it says when it does not.
         kept_(
             gate_, [] { return std::optional<Error>{}; }, sql::CirFolder(folder_->cir_archive())),
@@ -147,10 +150,12 @@ Result<std::unique_ptr<Database>> open_postgres(const PostgresOptions& options) 
   BOOST_OUTCOME_TRY(auto folder, sql::DataFolder::open(options.data_dir, 0));
   try {
     std::unique_ptr<ServerLease> lease;
+    std::optional<LeaseWish> wish = options.lease;
+    if (wish) wish->newest_schema = newest_schema_version();
     const bool leased = has_lease(*std::make_unique<PostgresConnection>(options.address));
     // Before the migration: a newer server that stands by leaves the tables as they are until it is its turn.
-    if (options.lease && leased) {
-      BOOST_OUTCOME_TRY(lease, ServerLease::take(options.address, *options.lease));
+    if (wish && leased) {
+      BOOST_OUTCOME_TRY(lease, ServerLease::take(options.address, *wish));
     }
     PostgresConnection connection(options.address);
     BOOST_OUTCOME_TRYV(sql::migrate_postgres(connection, postgresql_migrations(), SystemClock{}.now()));
@@ -164,8 +169,8 @@ Result<std::unique_ptr<Database>> open_postgres(const PostgresOptions& options) 
               " is empty: copy the rows with 'anchord database copy', or give another --data-dir");
     }
     BOOST_OUTCOME_TRYV(folder->note_postgres(sql::shown_address(options.address)));
-    if (options.lease && !lease) {
-      BOOST_OUTCOME_TRY(lease, ServerLease::take(options.address, *options.lease));
+    if (wish && !lease) {
+      BOOST_OUTCOME_TRY(lease, ServerLease::take(options.address, *wish));
     }
     return std::unique_ptr<Database>(
         std::make_unique<PostgresDatabase>(options, std::move(folder), std::move(lease)));

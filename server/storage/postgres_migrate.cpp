@@ -45,11 +45,7 @@ Result<std::size_t> applied(PostgresConnection& connection, std::span<const Migr
                             digest);
     }
   }
-  if (n > migrations.size()) {
-    return make_error(Errc::unsupported, "the database has version " + std::to_string(n) +
-                                             "; this anchord supports versions up to " +
-                                             std::to_string(migrations.size()) + ". Use the newer anchord");
-  }
+  if (n > migrations.size()) return newer_database(static_cast<int>(n), static_cast<int>(migrations.size()));
   return n;
 }
 
@@ -76,6 +72,12 @@ Result<void> bring_up(PostgresConnection& connection, std::span<const Migration>
 }
 
 }  // namespace
+
+Error newer_database(int version, int newest) {
+  return make_error(Errc::unsupported, "the database has version " + std::to_string(version) +
+                                           "; this anchord supports versions up to " +
+                                           std::to_string(newest) + ". Use the newer anchord");
+}
 
 int postgres_version(PostgresConnection& connection) {
   if (number(connection, k_has_versions) == 0) return 0;

@@ -13,6 +13,9 @@ namespace anchord::sql {
 Result<void> migrate_postgres(PostgresConnection& connection, std::span<const Migration> migrations,
                               UtcTime now);
 
+/// Why a program that supports versions up to `newest` leaves this database alone.
+Error newer_database(int version, int newest);
+
 /// The newest step that was applied; 0: none.
 int postgres_version(PostgresConnection& connection);
 

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "server/storage/postgres_connection.hpp"
+#include "server/storage/postgres_migrate.hpp"
 
 namespace anchord {
 namespace {
@@ -33,6 +34,14 @@ constexpr const char* k_renew_lease =
     "standby_t_ns > now_ns() - ?3";
 constexpr const char* k_give_back_lease =
     "UPDATE server_lease SET lease_t_ns = 0 WHERE one = 1 AND fence = ?1";
+
+// What began before the lease was taken has passed assert_server and could still be committed.
+constexpr const char* k_end_under_way =
+    "WITH under_way AS MATERIALIZED (SELECT pid FROM pg_stat_activity WHERE datname = current_database() AND "
+    "usename = current_user AND application_name = ?1 AND state <> 'idle' AND pid <> pg_backend_pid()) "
+    "SELECT count(*) FROM under_way WHERE pg_terminate_backend(pid)";
+constexpr auto k_look_again = std::chrono::milliseconds(20);
+constexpr auto k_end_within = std::chrono::seconds(5);
 
 std::int64_t ns(std::chrono::milliseconds length) {
   return std::chrono::duration_cast<std::chrono::nanoseconds>(length).count();
@@ -65,11 +74,17 @@ namespace {
 
 struct Attempt {
   std::optional<std::int64_t> fence;
+  std::optional<Error> refused;
   std::string holder;
 };
 
 Attempt attempt(PostgresConnection& c, const LeaseWish& wish) {
   Attempt out;
+  // One that cannot use the tables takes no lease, and leaves no mark: the holder would count on it.
+  if (const int version = sql::postgres_version(c); wish.newest_schema > 0 && version > wish.newest_schema) {
+    out.refused = sql::newer_database(version, wish.newest_schema);
+    return out;
+  }
   {
     Query take(c, k_take_lease);
     take << wish.server << ns(wish.lease);
@@ -80,6 +95,12 @@ Attempt attempt(PostgresConnection& c, const LeaseWish& wish) {
   if (wish.standby) holder << wish.server;
   if (holder.step()) out.holder = holder.text();
   return out;
+}
+
+std::int64_t end_under_way(PostgresConnection& c) {
+  Query query(c, k_end_under_way);
+  query << k_server_sessions;
+  return query.returned().value_or(0);
 }
 
 Error held_by(const std::string& other) {
@@ -100,8 +121,15 @@ Result<std::unique_ptr<ServerLease>> ServerLease::take(const std::string& addres
   for (;;) {
     try {
       const auto made = line->run([&](PostgresConnection& c) { return attempt(c, wish); });
-      if (made.fence)
+      if (made.refused) return *made.refused;
+      if (made.fence) {
+        for (const auto deadline = SteadyClock::now() + k_end_within; line->run(end_under_way) > 0;) {
+          if (SteadyClock::now() > deadline)
+            throw SqlError(sql::Failure::unavailable, "sessions of the server before do not end");
+          std::this_thread::sleep_for(k_look_again);
+        }
         return std::unique_ptr<ServerLease>(new ServerLease(std::move(line), std::move(wish), *made.fence));
+      }
       if (!wish.standby && SteadyClock::now() > patience) return held_by(made.holder);
       if (wish.standby && wish.waits && named != made.holder) wish.waits(named = made.holder);
     } catch (const SqlError& error) {

@@ -14,12 +14,16 @@
 
 namespace anchord {
 
+/// Name of the sessions in which a server with a lease reads and writes.
+inline constexpr const char* k_server_sessions = "anchord server";
+
 /// How a server wants to have a PostgreSQL database.
 struct LeaseWish {
   std::string server;   ///< its name, for people
   bool standby{false};  ///< wait for as long as another one has it
   std::chrono::milliseconds lease{5'000};
-  std::function<bool()> stopping;                     ///< asked while it waits
+  int newest_schema{0};            ///< version of the newest tables that it can use; 0: any
+  std::function<bool()> stopping;  ///< asked while it waits
   std::function<void(std::string_view other)> waits;  ///< once: who has it
   std::function<void(std::string_view why)> lost;     ///< once, from another thread: it must end now
 };
@@ -32,7 +36,8 @@ struct LeaseWish {
 class ServerLease {
  public:
   /// Returns with the lease. errors  conflict: another server has it, and this one does not stand by;
-  /// canceled: stopping() while it waited; storage_unavailable
+  /// unsupported: the tables are newer than it can use, from the start or while it waited; canceled:
+  /// stopping() while it waited; storage_unavailable
   static Result<std::unique_ptr<ServerLease>> take(const std::string& address, LeaseWish wish);
   /// Gives it back, so that the one that stands by need not wait.
   ~ServerLease();

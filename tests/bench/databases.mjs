@@ -6,7 +6,7 @@ import { startServer } from '../e2e/server.mjs';
 import { cpuSeconds } from './load.mjs';
 
 /** CPU seconds of a process and of its children, those that ended too. */
-function familySeconds(pid) {
+export function familySeconds(pid) {
   const stat = (one) => readFileSync(`/proc/${one}/stat`, 'utf8').split(') ')[1].split(' ');
   const ended = Number(stat(pid)[13]) + Number(stat(pid)[14]);
   const children = readdirSync('/proc').filter((name) => {
@@ -26,22 +26,23 @@ const samples = Buffer.from(
 ).toString('base64');
 const cir = `,"cir":{"n":1016,"dt_ps":1001.6,"first_path_idx":744.2,"rxpacc":1001,"b64":"${samples}"}`;
 let sequence = 0;
-const range = (mission, extra) => {
+export const range = (mission, extra) => {
   const seq = sequence++;
   return (
     `{"t_us":${1777889472000000 + seq * 100},"tag":"0x6e01","anchor":"0x6a2${seq % 6}","distance_m":${(5 + (seq % 1000) / 100).toFixed(3)},` +
     `"rss_dbm":-84.3,"fp_dbm":-86.1,"rx_dbm":-82.7,"seq":${seq},"mission":"${mission}"${extra}}\n`
   );
 };
-const fix = (mission) => {
+/** Ten a second of an aircraft that hovers: one that jumped would be work for the live track, which is not what is measured. */
+export const fix = (mission) => {
   const seq = sequence++;
   return (
-    `{"t_us":${1777889472000000 + seq * 100},"lon":3.7131,"lat":51.0231,"h_m":${60 + (seq % 100) / 100},"fix":"fixed","seq":${seq},` +
+    `{"t_us":${1777889472000000 + seq * 100_000},"lon":3.7131,"lat":51.0231,"h_m":${60 + (seq % 10) / 1000},"fix":"fixed","seq":${seq},` +
     `"sigma_m":[0.01,0.01,0.02],"q":[0,0,0,1],"mission":"${mission}"}\n`
   );
 };
 
-async function mission(server) {
+export async function mission(server) {
   const answer = await server.fetch('/api/v1/missions', {
     json: {
       name: 'bench',

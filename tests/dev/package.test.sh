@@ -56,7 +56,7 @@ printf '%s\n' "$output" | sed 's/^/    /'
 expect "lintian" 0 ''
 
 # --- Compose: the form of the file, with every profile.
-for profile in field mqtt https; do
+for profile in field mqtt https cluster; do
   attempt docker-compose -f docker-compose.yml --profile "$profile" config --quiet
   expect "docker-compose.yml with profile $profile" 0 ''
 done
@@ -64,6 +64,47 @@ done
 attempt env ANCHORD_ALLOWED_HOSTS=anchord.example ANCHORD_TRUSTED_PROXIES=172.16.0.0/12 docker-compose -f docker-compose.yml --profile https config
 expect "the name of the server in a container" 0 'ANCHORD_ALLOWED_HOSTS: anchord.example'
 expect "the proxy of the server in a container" 0 'ANCHORD_TRUSTED_PROXIES: 172.16.0.0/12'
+
+# --- Its cluster: nothing is weaker than the first service, no password is in the file, each command line of ours is one that anchord reads.
+found=$(docker-compose -f docker-compose.yml --profile cluster config | /usr/bin/python3 -c '
+import shlex, sys, yaml
+services = yaml.safe_load(sys.stdin)["services"]
+hardened = {"read_only": True, "cap_drop": ["ALL"], "security_opt": ["no-new-privileges:true"]}
+for name, one in services.items():
+    if one.get("profiles") != ["cluster"]: continue
+    for key, value in hardened.items():
+        if one.get(key) != value: print("weak", name, key)
+    if "healthcheck" not in one or "restart" not in one: print("weak", name, "healthcheck, restart")
+    for port in one.get("ports", []):
+        if not str(port).startswith("127.0.0.1:"): print("weak", name, port)
+    settings = one.get("environment", {})
+    for key, value in settings.items():
+        if "PASSWORD" in key and not str(value).startswith("/run/secrets/"): print("weak", name, key)
+    if "build" not in one: continue
+    given = [key + "=" + str(value) for key, value in settings.items() if key.startswith("ANCHORD_")]
+    for what, words in (("command", one["command"]), ("health", one["healthcheck"]["test"][2:])):
+        print(what, shlex.join(["env", *given, sys.argv[1], *words]).replace("@postgres/", "@127.0.0.1:1/").replace(":8420", ":1") if what == "health" or words[0] == "worker"
+              else shlex.join(["env", *given, sys.argv[1], "config", "check", *words[1:]]))
+' "$ANCHORD_BINARY")
+weak=$(grep '^weak' <<<"$found")
+[[ -z $weak ]] ; pass_or_fail $? "the cluster of docker-compose.yml is weaker than its first service" "$weak"
+[[ $(grep -c '^command' <<<"$found") == 3 && $(grep -c '^health' <<<"$found") == 3 ]] ; pass_or_fail $? "two servers and a worker are not found in" "$found"
+while read -r what line; do
+  attempt timeout 20 bash -c "$line"
+  # What reads well and finds nobody at port 1 ends with 1; what it cannot read ends with 2.
+  if [[ $line == *" config check "* ]]; then expect "$line" 0 'configuration is valid'; else expect "$line" 1 '127\.0\.0\.1'; fi
+done <<<"$(grep -E '^(command|health)' <<<"$found")"
+docs/examples/cluster/secrets.sh "$scratch/secrets" "$EUID"
+missing=$(docker-compose -f docker-compose.yml --profile cluster config | /usr/bin/python3 -c '
+import os, sys, yaml
+for name, one in yaml.safe_load(sys.stdin)["secrets"].items():
+    if not os.path.isfile(os.path.join(sys.argv[1], os.path.basename(one["file"]))): print(name)' "$scratch/secrets")
+[[ -z $missing ]] ; pass_or_fail $? "secrets.sh does not make what docker-compose.yml wants" "$missing"
+open=$(find "$scratch/secrets" \( -name '*.pgpass' -o -name '*.key' -o -type d \) -perm /077)
+[[ -z $open ]] ; pass_or_fail $? "others than the owner reach secrets" "$open"
+before=$(cat "$scratch"/secrets/*)
+docs/examples/cluster/secrets.sh "$scratch/secrets" "$EUID"
+[[ $before == "$(cat "$scratch"/secrets/*)" ]] ; pass_or_fail $? "secrets.sh changes what is there"
 
 # --- SBOM: each library that is needed, each npm package of the page; a licence text for what is inside.
 read_sbom() { python3 -c '

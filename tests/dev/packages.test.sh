@@ -7,7 +7,7 @@ source tests/dev/checks.sh
 listed() { awk -v group="$1" '{sub(/#.*/, "")} NF && $2 == group {print $1}' .ci/packages; }   # listed "" | @GROUP
 twice=$(awk '{sub(/#.*/, "")} NF {print $1, $2}' .ci/packages | sort | uniq -d)
 [[ -z $twice ]] ; pass_or_fail $? ".ci/packages lists a package twice" "$twice"
-unknown=$(awk '{sub(/#.*/, "")} NF > 1 {print $2}' .ci/packages | sort -u | grep -vxE '@(runtime|recommended|test|lint|coverage|fuzz|bench|fresh|arm64)')
+unknown=$(awk '{sub(/#.*/, "")} NF > 1 {print $2}' .ci/packages | sort -u | grep -vxE '@(runtime|recommended|test|lint|coverage|fuzz|bench|fresh|arm64|cluster)')
 [[ -z $unknown ]] ; pass_or_fail $? "groups that no command installs" "$unknown"
 
 # --- nothing that nobody uses: a library's header is included somewhere, a program is named somewhere.

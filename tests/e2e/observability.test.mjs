@@ -34,6 +34,11 @@ test('promtool takes the rules, and each fires when it should', async () => {
   assert.match((await promtool(['check', 'rules', at('anchord.rules.yml')])).stdout, /SUCCESS: \d+ rules found/);
   assert.match((await promtool(['test', 'rules', at('anchord.rules.test.yml')])).stdout, /SUCCESS/);
   assert.match((await promtool(['check', 'config', at('prometheus.yml')])).stdout, /SUCCESS/);
+  // That of the cluster, with what it names by containers' paths.
+  const cluster = readFileSync(at('cluster.yml'), 'utf8').replace('/run/secrets/metrics.token', at('prometheus.yml'));
+  const file = join(server.dataDir, 'cluster.yml');
+  writeFileSync(file, cluster.replace('anchord.rules.yml', at('anchord.rules.yml')));
+  assert.match((await promtool(['check', 'config', file])).stdout, /SUCCESS/);
 });
 
 test('every metric of the rules and the board is one of the server', () => {

@@ -40,7 +40,7 @@ before(async () => {
   const ports = [await free_tcp_port(), await free_tcp_port()],
     sample = readFileSync(join(root, 'docs/examples/haproxy.cfg'), 'utf8'),
     changes = [
-      [/bind :443 ssl crt .*/, (front = `127.0.0.1:${await free_tcp_port()}`)],
+      [/bind .* ssl crt .*/, (front = `127.0.0.1:${await free_tcp_port()}`)],
       ['127.0.0.1:8420', `127.0.0.1:${ports[0]}`],
       ['127.0.0.1:8421', `127.0.0.1:${ports[1]}`],
     ];
@@ -119,6 +119,12 @@ test('a second server that does not stand by is refused with what to do, and the
     env: postgres.env,
   });
   assert.match(seen.stdout, new RegExp(`server \\S+/${holder.pid}, standby \\S+/${waiting.pid}`));
+  const health = (...more) =>
+    run(['healthcheck', '--url', `http://127.0.0.1:${waiting.port}`, ...more], { env: postgres.env });
+  assert.equal((await health()).code, 1, 'it listens on no port');
+  const healthy = await health('--database', postgres.url('anchord'));
+  assert.equal(healthy.code, 0, healthy.stderr);
+  assert.match(healthy.stdout, new RegExp(`standing by for \\S+/${holder.pid}`));
   const alone = await run(['serve', '--standby', '--data-dir', join(folder, 'alone')]);
   assert.equal(alone.code, 2);
   assert.match(alone.stderr, /standby: a folder has one server; give --database/);

@@ -1,11 +1,12 @@
-// Ranges that are right but for a factor, a step or a drift. Truth and ranges are made from a path in closed
-// form: the error put in is the error to be found.
+// Ranges or tracks that are right but for a factor, a step or a drift. Truth and ranges are made from a path
+// in closed form: the error put in is the error to be found.
 #include "core/localize/systematic_error.hpp"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "core/localize/flight_solver.hpp"
 #include "tests/core/localize/flight_support.hpp"
@@ -141,11 +142,59 @@ TEST(SystematicErrors, WithholdEveryAnchorWhereRangesDrift) {
   }
 }
 
+TEST(SystematicErrors, WithholdEveryAnchorWhereThePositionsDrift) {
+  for (const Eigen::Vector3d& drift_m :
+       {Eigen::Vector3d(0.6, 0, 0), Eigen::Vector3d(0, -0.6, 0), Eigen::Vector3d(0, 0, 0.8)}) {
+    FlightData flight = make_flight(turning(6));
+    const double from_s = flight.fixes.front().time.seconds(),
+                 length_s = flight.fixes.back().time.seconds() - from_s;
+    for (Fix& fix : flight.fixes) fix.local_m += drift_m * ((fix.time.seconds() - from_s) / length_s);
+    const FlightSolution solution = solve_flight(flight).value();
+    for (const AnchorSolution& anchor : solution.anchors) {
+      const Gate& gate = gate_named(anchor, "track_drift");
+      EXPECT_FALSE(gate.passed) << gate.why;
+      EXPECT_NEAR(gate.value.value_or(0), drift_m.norm(), 0.25 * drift_m.norm());
+      expect_says(gate, drift_m.z() > 0 ? "in height" : drift_m.x() > 0 ? "eastward" : "northward");
+      EXPECT_FALSE(anchor.estimate.acceptable());
+    }
+  }
+}
+
+TEST(SystematicErrors, WithholdEveryAnchorWhereThePositionsWander) {
+  FlightData flight = make_flight(turning(8));
+  const double from_s = flight.fixes.front().time.seconds(),
+               length_s = flight.fixes.back().time.seconds() - from_s;
+  for (Fix& fix : flight.fixes)
+    fix.local_m.y() += 0.4 * std::cos(2 * std::numbers::pi * (fix.time.seconds() - from_s) / length_s);
+  const FlightSolution solution = solve_flight(flight).value();
+  for (const AnchorSolution& anchor : solution.anchors) {
+    const Gate& gate = gate_named(anchor, "track_drift");
+    EXPECT_FALSE(gate.passed) << gate.why;
+    expect_says(gate, "northward to and fro during the flight");
+    EXPECT_FALSE(anchor.estimate.acceptable());
+  }
+}
+
+TEST(SystematicErrors, WithholdEveryAnchorWhereTheHeightsOfTheTrackHaveAFactor) {
+  for (const double factor : {0.85, 1.15}) {
+    FlightData flight = make_flight(turning(7));
+    for (Fix& fix : flight.fixes) fix.local_m.z() *= factor;
+    const FlightSolution solution = solve_flight(flight).value();
+    for (const AnchorSolution& anchor : solution.anchors) {
+      const Gate& gate = gate_named(anchor, "track_heights");
+      EXPECT_FALSE(gate.passed) << gate.why;
+      EXPECT_NEAR(gate.value.value_or(0), 0.15, 0.04);
+      expect_says(gate, factor > 1 ? "too far apart" : "too far together");
+      EXPECT_FALSE(anchor.estimate.acceptable());
+    }
+  }
+}
+
 TEST(SystematicErrors, LeaveGoodFlightsWithoutStepOrDrift) {
   for (const std::uint64_t seed : {11, 12, 13, 14, 15, 16}) {
     const FlightSolution solution = solve_flight(make_flight(turning(seed))).value();
     for (const AnchorSolution& anchor : solution.anchors) {
-      for (const char* name : {"range_step", "range_drift"}) {
+      for (const char* name : {"range_step", "range_drift", "track_drift", "track_heights"}) {
         const Gate& gate = gate_named(anchor, name);
         EXPECT_TRUE(gate.passed) << gate.why;
         EXPECT_LT(gate.value.value_or(1), 0.05) << name;

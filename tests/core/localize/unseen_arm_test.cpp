@@ -81,6 +81,41 @@ TEST(UnseenArm, IsSeenByAnAircraftThatTurns) {
   }
 }
 
+// The compass of an aircraft that turned all the time stood still; the arm's own accuracy says nothing then.
+TEST(UnseenArm, BelievesNoHeadingThatIsTheSameToTheLastDigit) {
+  MadeFlight made;
+  made.turn_rate_radps = 0.2;
+  made.arm_error_m = {0.3, 0, 0};
+  FlightData flight = make_flight(made);
+  flight.mission.tags.front().lever_arm_body_m += made.arm_error_m;
+  FlightOptions options;
+  options.lever_arm_sigma_m = 0.02;
+  const FlightSolution right = solved(flight, options);
+  for (const auto& anchor : right.anchors) EXPECT_TRUE(anchor.estimate.acceptable());
+  for (Fix& fix : flight.fixes) fix.enu_from_body = flight.fixes.front().enu_from_body;
+  const FlightSolution still = solved(flight, options);
+  for (std::size_t i = 0; i < made.anchors.size(); ++i) {
+    ASSERT_NE(unseen(still.anchors[i]), nullptr);
+    if (!unseen(still.anchors[i])->passed) continue;
+    const Hypothesis& best = still.anchors[i].estimate.best.value();
+    const Eigen::Vector3d off = best.position.m - made.anchors[i];
+    EXPECT_LT(off.dot(best.covariance_m2.inverse() * off), 7.815) << i;  // 95 %, three degrees
+  }
+  EXPECT_TRUE(std::ranges::any_of(still.notes, [](const std::string& note) {
+    return note.find("the heading of the track is the same in all positions") != std::string::npos;
+  }));
+}
+
+TEST(UnseenArm, BelievesAHeadingThatIsHeldButMeasured) {
+  FlightData flight = make_flight(MadeFlight{});
+  flight.mission.tags.front().lever_arm_body_m.x() = 0.3;
+  for (std::size_t i = 0; i < flight.fixes.size(); ++i)
+    flight.fixes[i].enu_from_body = Eigen::Quaterniond(
+        Eigen::AngleAxisd(0.002 * std::sin(static_cast<double>(i)), Eigen::Vector3d::UnitZ()));
+  for (const std::string& note : solved(flight).notes)
+    EXPECT_EQ(note.find("the heading of the track"), std::string::npos) << note;
+}
+
 // What the sentence tells the operator to do.
 TEST(UnseenArm, IsSeenWhereTheHeadingIsAQuarterTurnAwayForTwentySeconds) {
   for (std::uint64_t seed = 1; seed <= 5; ++seed) {

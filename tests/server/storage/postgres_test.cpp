@@ -357,7 +357,7 @@ TEST_F(Postgres, TablesComeAfterThoseTheyName) {
   // All but those that are of the database itself.
   names.insert(names.end(), {"schema_migration", "server_lease"});
   std::vector<std::string> there;
-  Query tables(*c, "SELECT tablename FROM pg_tables WHERE schemaname = 'public'");
+  Query tables(*c, "SELECT CAST(tablename AS TEXT) FROM pg_tables WHERE schemaname = 'public'");
   while (tables.step()) there.push_back(tables.text());
   EXPECT_THAT(names, UnorderedElementsAreArray(there));
 }

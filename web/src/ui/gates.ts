@@ -63,7 +63,7 @@ const WORDS: Record<string, Words> = {
   },
   range_scale: {
     passes: 'No scale error of the ranges is seen',
-    fails: 'The ranges are too long or too short by a factor: wrong unit, clock or setting of the radios',
+    fails: 'The ranges are too long or too short by a factor',
     unit: '%',
   },
   range_step: {
@@ -73,12 +73,22 @@ const WORDS: Record<string, Words> = {
   },
   range_drift: {
     passes: 'No drift of the ranges over the flight',
-    fails: 'The ranges drift over the flight: a radio that was not warm, or a clock',
+    fails: 'The ranges drift over the flight',
     unit: 'm',
+  },
+  track_drift: {
+    passes: 'No drift of the positions over the flight',
+    fails: 'The positions drift over the flight',
+    unit: 'm',
+  },
+  track_heights: {
+    passes: 'The heights of the track fit the ranges',
+    fails: 'The heights of the track are too far apart or together',
+    unit: '%',
   },
   track_shift: {
     passes: 'No shift of the track at its gaps',
-    fails: 'A part of the track is shifted against the rest: wrong fix, or the base position changed',
+    fails: 'A part of the track is shifted against the rest',
     unit: 'χ²',
   },
   track: {
