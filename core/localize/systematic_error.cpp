@@ -31,6 +31,8 @@ constexpr int k_own = 4, k_near = k_shared_size, k_asked = k_near + 1, k_residua
 using Sums = Eigen::Matrix<double, k_own + k_rest, k_own + k_rest>;
 using Rest = Eigen::Matrix<double, k_rest, k_rest>;
 using Coupling = Eigen::Matrix<double, k_own, k_rest>;
+using Known = Eigen::Matrix<double, k_asked, 1>;
+using KnownMatrix = Eigen::Matrix<double, k_asked, k_asked>;
 
 /// How residuals count: as in the fit, or large ones less, but all of them: what an error makes of ranges the
 /// fit may have taken for outliers.
@@ -56,11 +58,22 @@ class ErrorTest {
     Eigen::Matrix4d own_inverse{Eigen::Matrix4d::Zero()};
     Eigen::Vector4d prior_gradient{Eigen::Vector4d::Zero()};
   };
+  /// Of one anchor: place and delay beside the rest, and the rest without them.
+  struct Part {
+    Coupling coupling;
+    Rest reduced;
+  };
   Anchor anchor_of(std::size_t index, Weighing weighing) const;
-  Sums sums_of(std::size_t anchor, const ErrorQuestion& question) const;
+  /// What is asked, of the ranges of one antenna alone, or of all.
+  Part part_of(std::size_t anchor, const std::optional<std::size_t>& antenna) const;
 
   Given given_;
   std::vector<Anchor> anchors_;
+  std::vector<Part> parts_;           ///< of all antennas
+  Rest reduced_{Rest::Zero()};        ///< of all anchors
+  Known gradient_{Known::Zero()};     ///< of what is known beside: by_shared, slope of near ranges
+  Eigen::LDLT<KnownMatrix> known_;    ///< with a bias that is open
+  Eigen::LDLT<SharedMatrix> shared_;  ///< as in the fit, which has no slope
 };
 
 double weight_per_m2(const WeighedRow& by, const JointRow& row, const JointLine& line,
@@ -165,26 +178,22 @@ ErrorTest::Anchor ErrorTest::anchor_of(std::size_t index, Weighing weighing) con
   return out;
 }
 
-ErrorTest::ErrorTest(const Given& given, Weighing weighing) : given_(given) {
-  for (std::size_t i = 0; i < given.flight.anchors.size(); ++i) anchors_.push_back(anchor_of(i, weighing));
-}
-
-/// Of one anchor, with the column of the question where the first of those asked is; where the question has
-/// no part, nothing stands there.
-Sums ErrorTest::sums_of(std::size_t anchor, const ErrorQuestion& question) const {
-  const int column = k_own + k_asked, asked = column + static_cast<int>(question.column);
+ErrorTest::Part ErrorTest::part_of(std::size_t anchor, const std::optional<std::size_t>& antenna) const {
+  const Anchor& of = anchors_[anchor];
   Sums all = Sums::Zero();
-  for (std::size_t k = 0; k < anchors_[anchor].by_antenna.size(); ++k) {
-    Sums sums = anchors_[anchor].by_antenna[k];
-    sums.row(column).swap(sums.row(asked));
-    sums.col(column).swap(sums.col(asked));
-    if (!question.has(anchor, k)) {
-      sums.row(column).setZero();
-      sums.col(column).setZero();
+  for (std::size_t k = 0; k < of.by_antenna.size(); ++k) {
+    Sums sums = of.by_antenna[k];
+    if (antenna && k != *antenna) {
+      sums.middleRows<k_errors>(k_own + k_asked).setZero();
+      sums.middleCols<k_errors>(k_own + k_asked).setZero();
     }
     all += sums;
   }
-  return all;
+  Part out{all.topRightCorner<k_own, k_rest>(), all.bottomRightCorner<k_rest, k_rest>()};
+  out.coupling.col(k_residual) += of.prior_gradient;
+  if (given_.options.dims == Dims::two) out.coupling.row(2).setZero();
+  out.reduced -= out.coupling.transpose() * of.own_inverse * out.coupling;
+  return out;
 }
 
 /// A prior that takes the kit for calibrated would make an error of what a bias is.
@@ -195,39 +204,45 @@ SharedPrior with_open_bias(SharedPrior prior) {
   return prior;
 }
 
-ErrorAnswer ErrorTest::ask(const ErrorQuestion& question, double since) const {
-  const SharedPrior prior = with_open_bias(given_.prior);
-  Rest rest = Rest::Zero();
-  std::vector<Coupling> couplings;
-  for (std::size_t i = 0; i < anchors_.size(); ++i) {
-    const Sums sums = sums_of(i, question);
-    Coupling& coupling = couplings.emplace_back(sums.topRightCorner<k_own, k_rest>());
-    coupling.col(k_residual) += anchors_[i].prior_gradient;
-    if (given_.options.dims == Dims::two) coupling.row(2).setZero();
-    rest +=
-        sums.bottomRightCorner<k_rest, k_rest>() - coupling.transpose() * anchors_[i].own_inverse * coupling;
+ErrorTest::ErrorTest(const Given& given, Weighing weighing) : given_(given) {
+  for (std::size_t i = 0; i < given.flight.anchors.size(); ++i) {
+    anchors_.push_back(anchor_of(i, weighing));
+    reduced_ += parts_.emplace_back(part_of(i, std::nullopt)).reduced;
   }
-  rest.topLeftCorner<k_shared_size, k_shared_size>() += prior.information;
-  rest.block<k_shared_size, 1>(0, k_residual) += prior.information * (prior.mean - given_.fit.state.shared);
-  rest(k_near, k_near) += 1.0 / (k_near_prior * k_near_prior);
-  const Eigen::Matrix<double, k_asked, 1> with = rest.block<k_asked, 1>(0, k_asked);
-  const Eigen::Matrix<double, k_asked, 1> followed =
-      rest.topLeftCorner<k_asked, k_asked>().ldlt().solve(with);
-  const double information = std::max(rest(k_asked, k_asked) - with.dot(followed), 0.0);
-  const double score =
-      rest(k_asked, k_residual) - followed.dot(rest.block<k_asked, 1>(0, k_residual)) + information * since;
+  const SharedPrior prior = with_open_bias(given.prior);
+  gradient_ = reduced_.block<k_asked, 1>(0, k_residual);
+  gradient_.head<k_shared_size>() += prior.information * (prior.mean - given.fit.state.shared);
+  KnownMatrix known = reduced_.topLeftCorner<k_asked, k_asked>();
+  shared_.compute(known.topLeftCorner<k_shared_size, k_shared_size>() + given.prior.information);
+  known.topLeftCorner<k_shared_size, k_shared_size>() += prior.information;
+  known(k_near, k_near) += 1.0 / (k_near_prior * k_near_prior);
+  known_.compute(known);
+}
+
+ErrorAnswer ErrorTest::ask(const ErrorQuestion& question, double since) const {
+  const int column = k_asked + static_cast<int>(question.column);
+  std::vector<Part> of_antenna;
+  Rest asked = question.anchor ? parts_[*question.anchor].reduced : reduced_;
+  if (question.antenna) {
+    asked.setZero();
+    for (std::size_t i = 0; i < anchors_.size(); ++i)
+      asked += of_antenna.emplace_back(part_of(i, question.antenna)).reduced;
+  }
+  const Known with = asked.block<k_asked, 1>(0, column), followed = known_.solve(with);
+  const double information = std::max(asked(column, column) - with.dot(followed), 0.0);
+  const double score = asked(column, k_residual) - followed.dot(gradient_) + information * since;
   const double with_prior = information + 1.0 / (question.known().prior * question.known().prior);
   ErrorAnswer out;
   out.question = question;
   out.found = {score / with_prior, 1.0 / std::sqrt(with_prior), score / std::sqrt(with_prior)};
   // The fit followed the error with the prior it has, and without a slope.
-  rest.topLeftCorner<k_shared_size, k_shared_size>() += given_.prior.information - prior.information;
-  const SharedVector shared =
-      rest.topLeftCorner<k_shared_size, k_shared_size>().ldlt().solve(with.head<k_shared_size>());
-  for (std::size_t i = 0; i < anchors_.size(); ++i)
-    out.moved.emplace_back((anchors_[i].own_inverse *
-                            (couplings[i].col(k_asked) - couplings[i].leftCols<k_shared_size>() * shared))
-                               .head<3>());
+  const SharedVector shared = shared_.solve(with.head<k_shared_size>());
+  for (std::size_t i = 0; i < anchors_.size(); ++i) {
+    Eigen::Vector4d own = -(parts_[i].coupling.leftCols<k_shared_size>() * shared);
+    if (!question.anchor || *question.anchor == i)
+      own += (question.antenna ? of_antenna : parts_)[i].coupling.col(column);
+    out.moved.emplace_back((anchors_[i].own_inverse * own).head<3>());
+  }
   return out;
 }
 

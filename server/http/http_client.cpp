@@ -71,10 +71,7 @@ class Exchange {
   void receive_with(httplib::Request& out) {
     out.response_handler = [this](const httplib::Response& answer) {
       if (watch_ != nullptr) watch_->begun();
-      response_.status = answer.status;
-      response_.headers.clear();
-      for (const auto& [name, value] : answer.headers) response_.headers[lower(name)] = value;
-      response_.body.clear();
+      take_head(answer);
       into_ = answer.status == 200 ? request_.into : nullptr;
       if (into_ != nullptr && (std::fflush(into_) != 0 || ::ftruncate(::fileno(into_), 0) != 0)) failed();
       if (into_ != nullptr) std::rewind(into_);
@@ -97,6 +94,14 @@ class Exchange {
     };
   }
 
+  /// Also of an answer that has no body (204, or to HEAD), for which the library calls nothing.
+  void take_head(const httplib::Response& answer) {
+    response_.status = answer.status;
+    response_.headers.clear();
+    for (const auto& [name, value] : answer.headers) response_.headers[lower(name)] = value;
+    response_.body.clear();
+  }
+  bool has_head() const { return response_.status != 0; }
   bool bodiless() const { return bodiless_; }
   /// Of this side.
   std::optional<Error> failure() {
@@ -210,6 +215,7 @@ Result<ClientResponse> HttpClient::call(const ClientRequest& request) {
   if (watch && !watch->why().empty()) return make_error(Errc::link_lost, state_->origin + " " + watch->why());
   if (!answer && !exchange.bodiless())
     return make_error(Errc::link_lost, why(answer.error(), state_->origin));
+  if (answer && !exchange.has_head()) exchange.take_head(*answer);
   return std::move(exchange).response();
 }
 
