@@ -19,6 +19,7 @@ constexpr double k_near_prior = 0.06;   // by so many metres a metre, one sigma
 constexpr double k_odd_z = 1.5;         // worth another solve
 constexpr std::size_t k_most_again = 3;
 constexpr int k_rounds = 3;
+constexpr double k_shown_z = 4, k_growing = 1.1;
 constexpr double k_wide_scales = 3;         // beyond, a residual counts less: a factor makes them large
 constexpr double k_imitated_bias_m = 0.15;  // no factor is shown by ranges that only differ from a known bias
 // As of a shift of the track.
@@ -270,7 +271,7 @@ Result<void> ask_again(const ErrorTest::Given& given, double first, ErrorAnswer&
   ErrorFinding found = answer.found;
   found.value = first;
   for (int round = 0; round < k_rounds; ++round) {
-    const double since = found.value;
+    const double since = found.value, before_z = std::abs(found.z);
     const FlightRows rows = corrected(given, answer.question, since);
     BOOST_OUTCOME_TRY(const auto again, solve_joint(rows, state, given.prior, given.options));
     found = ErrorTest({rows, again, given.prior, given.options, given.middle}, Weighing::as_fitted)
@@ -278,6 +279,8 @@ Result<void> ask_again(const ErrorTest::Given& given, double first, ErrorAnswer&
                 .found;
     state = again.state;
     if (std::abs(found.value - since) < 0.05 * found.sigma) break;
+    // An error that is there shows the more, the more of it was taken off.
+    if (std::abs(found.z) < k_shown_z && std::abs(found.z) < k_growing * before_z) break;
   }
   if (std::isfinite(found.z) && std::abs(found.z) > std::abs(answer.found.z)) answer.found = found;
   return boost::outcome_v2::success();
