@@ -85,9 +85,10 @@ std::string why_track_drift(const ErrorAnswer& answer) {
   constexpr std::array k_ways{"eastward", "northward", "in height"};
   const ErrorFinding& found = answer.found;
   const char* way = k_ways[answer.question.axis()];
-  // A straight line goes from minus half to half of its value, waves from minus one to one.
   const char* course = answer.question.bends() == 0 ? "over the flight" : "to and fro during the flight";
-  const double size_m = (answer.question.bends() == 0 ? 1.0 : 2.0) * std::abs(found.value);
+  // From the lowest to the highest value of each of error_columns' polynomials.
+  constexpr std::array<double, k_track_bends> k_spans{1.0, 1.5, 2.0};
+  const double size_m = k_spans[answer.question.bends()] * std::abs(found.value);
   char text[400];
   if (answer.over_limit() <= 1)
     std::snprintf(text, sizeof text, "no drift of the positions is seen: at most %.3f m %s %s (%.1f sigma)",

@@ -39,9 +39,8 @@ struct ErrorQuestion {
   std::size_t column{};
   std::optional<std::size_t> antenna{}, anchor{};
   ErrorKind kind() const { return static_cast<ErrorKind>(std::min(column, k_track_columns)); }
-  std::size_t axis() const {
-    return (column - k_track_columns) / k_track_bends;
-  }  ///< of a drift of the track
+  /// Of a drift of the track.
+  std::size_t axis() const { return (column - k_track_columns) / k_track_bends; }
   std::size_t bends() const { return (column - k_track_columns) % k_track_bends; }
   bool all() const { return !anchor && !antenna; }
   bool has(std::size_t of_anchor, std::size_t of_antenna) const {

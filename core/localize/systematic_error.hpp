@@ -41,7 +41,7 @@ struct SystematicErrors {
 /// at 2 m): that slope is an unknown beside it, so that a small hall alone shows no factor.
 ///
 /// What the ranges cannot exclude is in the regions, as a shift of the track is (track_shift.hpp): before the
-/// ranges one flight in eight has a factor, one in fifty a step or a drift, one in two hundred such a track.
+/// ranges one flight in eight has a factor, one in fifty a step or a drift, one in fifty such a track.
 /// errors  canceled
 Result<SystematicErrors> check_systematic_errors(const FlightRows& flight, const JointFit& fit,
                                                  const SharedPrior& prior, const FlightOptions& options);
