@@ -19,6 +19,7 @@
 #include "server/app/authenticator.hpp"
 #include "server/app/metrics.hpp"
 #include "server/app/model_key.hpp"
+#include "server/app/standby.hpp"
 #include "server/config/listeners.hpp"
 #include "server/flight/demonstration_flight.hpp"
 #include "server/flight/drone_link.hpp"
@@ -169,9 +170,11 @@ Result<void> App::State::open_rows(const Waiting& waiting) {
   if (wish.standby && address.empty())
     return make_error(Errc::invalid_argument,
                       "standby: a folder has one server; give --database, which several can reach");
+  wish.url = config.text("standby_url");
   wish.stopping = waiting.stopping;
-  wish.waits = [ready = waiting.ready](std::string_view other) {
-    log(LogLevel::info, "standing by", {{"server", other}});
+  BOOST_OUTCOME_TRY(const auto standby, Standby::make(config, listeners, proxies));
+  wish.waits = [&standby, ready = waiting.ready](std::string_view other, std::string_view url) {
+    standby->wait_for(other, url);
     if (ready) ready();
   };
   wish.lost = [this](std::string_view why) { abandon(why); };

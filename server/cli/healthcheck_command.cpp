@@ -30,7 +30,7 @@ bool of_this_machine(const std::string& name) {
   return name.starts_with(own.substr(0, own.rfind('/') + 1));
 }
 
-/// A server that stands by listens on no port, and is in order all the same.
+/// A server that stands by does not answer itself, and is in order all the same.
 int check_standby(const HealthcheckOptions& options, const std::string& why_not_ready) {
   if (options.database.empty()) return unhealthy(why_not_ready);
   const auto facts = look_at_postgres(options.database);
@@ -47,8 +47,9 @@ int check_server(const HealthcheckOptions& options) {
   if (!client) return unhealthy(client.error().message);
   const auto answer = client.value().call("GET", "/readyz");
   if (!answer) return check_standby(options, answer.error().message);
+  if (answer.value().status != 200) return check_standby(options, answer.value().body);
   std::printf("%s\n", answer.value().body.c_str());
-  return answer.value().status == 200 ? 0 : 1;
+  return 0;
 }
 
 int check_worker(const HealthcheckOptions& options) {

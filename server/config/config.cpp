@@ -29,6 +29,9 @@ constexpr std::array k_options = {
            database},
     Option{"standby", "false",
            "with database: wait while another server has it, and take over when that one ends", flag},
+    Option{"standby_url", "",
+           "with standby: where the other servers of the database reach this one, like http://10.0.0.7:8420; "
+           "they pass on to it what they are asked while it has the database"},
     Option{"auth", "on",
            "off: no login, everyone may do everything; only on loopback addresses, for demonstrations",
            choice, "on|off"},

@@ -3,54 +3,14 @@
 #include <algorithm>
 #include <boost/asio/executor_work_guard.hpp>
 #include <boost/asio/io_context.hpp>
-#include <boost/asio/ip/v6_only.hpp>
-#include <charconv>
 #include <thread>
 
 #include "core/base/check.hpp"
 #include "core/base/guard.hpp"
-#include "core/base/text.hpp"
+#include "server/http/endpoint.hpp"
 #include "server/http/sessions.hpp"
 
 namespace anchord::server {
-namespace {
-
-/// Answer to one who finds no place, without reading what he asks.
-std::string no_place(const std::string& why) {
-  const std::string body =
-      R"({"type":"/problems/overloaded","title":"The server is overloaded","status":503,"detail":")" + why +
-      R"(; try again"})";
-  return "HTTP/1.1 503 Service Unavailable\r\nRetry-After: 5\r\nContent-Type: application/problem+json\r\n"
-         "Content-Length: " +
-         std::to_string(body.size()) + "\r\nConnection: close\r\n\r\n" + body;
-}
-
-Result<tcp::endpoint> parse_endpoint(std::string_view text) {
-  const auto bad = [&] {
-    return make_error(Errc::invalid_argument,
-                      "'" + to_utf8(text, 80) + "' is not an address like 127.0.0.1:8420 or [::1]:8420");
-  };
-  const auto colon = text.rfind(':');
-  if (colon == std::string_view::npos) return bad();
-  std::string_view host = text.substr(0, colon);
-  const std::string_view digits = text.substr(colon + 1);
-  if (host.starts_with('[') && host.ends_with(']')) host = host.substr(1, host.size() - 2);
-  if (host == "localhost") host = "127.0.0.1";
-  std::uint16_t port = 0;
-  const auto [end, status] = std::from_chars(digits.data(), digits.data() + digits.size(), port);
-  if (digits.empty() || status != std::errc{} || end != digits.data() + digits.size()) return bad();
-  error_code error;
-  const auto address = asio::ip::make_address(std::string(host), error);
-  if (error) return bad();
-  return tcp::endpoint(address, port);
-}
-
-bool out_of_descriptors(const error_code& error) {
-  return error == asio::error::no_descriptors || error.value() == ENFILE ||
-         error == asio::error::no_buffer_space || error == asio::error::no_memory;
-}
-
-}  // namespace
 
 struct HttpServer::State {
   std::shared_ptr<SessionContext> context;
@@ -80,24 +40,18 @@ struct HttpServer::State {
   static asio::awaitable<void> accept_all(Listener listener, std::shared_ptr<SessionContext> context,
                                           asio::io_context& io) {
     const auto acceptor = listener.acceptor;
-    asio::steady_timer pause(acceptor->get_executor());
     while (!context->stopping) {
       tcp::socket socket(asio::make_strand(io));
-      const auto [error] = co_await acceptor->async_accept(socket, k_wait);
-      if (error == asio::error::operation_aborted || !acceptor->is_open()) co_return;
-      if (error) {
-        // Without a pause a full descriptor table would make this loop spin on the connection it cannot take.
-        pause.expires_after(std::chrono::milliseconds(out_of_descriptors(error) ? 200 : 10));
-        co_await pause.async_wait(k_wait);
-        continue;
-      }
+      const bool accepted = co_await accept_one(*acceptor, socket);
+      if (!acceptor->is_open()) co_return;
+      if (!accepted) continue;
       error_code ignored;
       const auto address = socket.remote_endpoint(ignored).address().to_string(ignored);
       auto entry = context->book.enter(address, context->is_proxy && context->is_proxy(address));
       if (entry.evict) entry.evict->evict();
       if (!entry.place) {
         // In a handshake a plain answer would be garbage.
-        const std::string answer = listener.tls ? std::string() : no_place(entry.why);
+        const std::string answer = listener.tls ? std::string() : unread_503(entry.why);
         socket.non_blocking(true, ignored);
         if (!answer.empty()) socket.write_some(asio::buffer(answer), ignored);
         socket.shutdown(tcp::socket::shutdown_both, ignored);
@@ -125,18 +79,7 @@ HttpServer::~HttpServer() { stop(std::chrono::milliseconds(0)); }
 
 Result<std::uint16_t> HttpServer::listen(std::string_view text, bool tls) {
   ANCHORD_CHECK(!tls || state_->context->tls, "a listener with TLS needs a certificate");
-  BOOST_OUTCOME_TRY(const auto endpoint, parse_endpoint(text));
-  auto acceptor = std::make_shared<tcp::acceptor>(state_->io);
-  error_code error;
-  acceptor->open(endpoint.protocol(), error);
-  if (!error) acceptor->set_option(tcp::acceptor::reuse_address(true), error);
-  if (!error && endpoint.address().is_v6()) acceptor->set_option(asio::ip::v6_only(true), error);
-  if (!error) acceptor->bind(endpoint, error);
-  if (!error) acceptor->listen(1024, error);
-  if (error) {
-    const auto code = error == asio::error::address_in_use ? Errc::conflict : Errc::unsupported;
-    return make_error(code, "cannot listen on " + std::string(text) + ": " + error.message());
-  }
+  BOOST_OUTCOME_TRY(const auto acceptor, listen_at(state_->io, text));
   state_->listeners.push_back({acceptor, tls});
   return acceptor->local_endpoint().port();
 }

@@ -21,6 +21,7 @@ template <class T>
 using awaitable = asio::awaitable<T>;
 
 constexpr std::size_t k_piece_bytes = 16 * 1024;
+constexpr int k_most_proxies = 4;  // in a row that speak the PROXY protocol
 
 enum class BodyEnd : std::uint8_t { complete, lost, refused };
 
@@ -36,7 +37,8 @@ class HttpSession final : public Connection, public std::enable_shared_from_this
         limits_(context_->limits),
         tls_(tls),
         pool_(&context_->pools.ordinary),
-        remote_(wire_.remote()) {}
+        peer_(wire_.remote()),
+        remote_(peer_) {}
   ~HttpSession() override {
     context_->book.busy(this);
     context_->leave(this);
@@ -44,6 +46,8 @@ class HttpSession final : public Connection, public std::enable_shared_from_this
 
   static awaitable<void> run(std::shared_ptr<HttpSession> self) {
     self->context_->enter(self.get(), self->weak_from_this());
+    const bool known = co_await self->settle_client();
+    if (!known) co_return;
     if (self->tls_) {
       const bool secured = co_await self->secure();
       if (!secured) co_return;
@@ -72,10 +76,25 @@ class HttpSession final : public Connection, public std::enable_shared_from_this
     bell_.cancel();
   }
 
+  /// A trusted proxy may say for whom it connects, which may be another one of them.
+  awaitable<bool> settle_client() {
+    for (int hop = 0; hop < k_most_proxies && context_->is_proxy && context_->is_proxy(remote_); ++hop) {
+      awaits_head_ = true;
+      context_->book.idle(peer_, this, weak_from_this());
+      const auto header = co_await wire_.take_proxy_header();
+      awaits_head_ = false;
+      context_->book.busy(this);
+      if (!header) co_return false;
+      if (!header->client) break;
+      remote_ = *header->client;
+    }
+    co_return true;
+  }
+
   /// Keys are exchanged. Until then it is one of those that go first when places run out.
   awaitable<bool> secure() {
     awaits_head_ = true;
-    context_->book.idle(remote_, this, weak_from_this());
+    context_->book.idle(peer_, this, weak_from_this());
     const bool secured = co_await wire_.secure(context_->tls->begin());
     awaits_head_ = false;
     context_->book.busy(this);
@@ -94,7 +113,7 @@ class HttpSession final : public Connection, public std::enable_shared_from_this
   /// One request and its answer. False: the connection is finished.
   awaitable<bool> serve_one(bool first) {
     awaits_head_ = true;
-    context_->book.idle(remote_, this, weak_from_this());
+    context_->book.idle(peer_, this, weak_from_this());
     const HttpWire::Head head = co_await wire_.read_head(first, context_->stopping);
     awaits_head_ = false;
     context_->book.busy(this);
@@ -423,6 +442,7 @@ class HttpSession final : public Connection, public std::enable_shared_from_this
   const bool tls_;
   WorkerPool* pool_;             ///< of the exchange that runs
   std::shared_ptr<void> share_;  ///< of heavy work, while it runs and is sent
+  const std::string peer_;       ///< who connected
   std::string remote_, route_;
   std::shared_ptr<api::Request> request_;  ///< of the exchange that runs
   Refusal refusal_;

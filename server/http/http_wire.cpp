@@ -22,6 +22,13 @@ std::string speaks_https() {
          std::to_string(body.size()) + "\r\nConnection: close\r\n\r\n" + body;
 }
 
+/// Answer to a proxy whose word about its clients is not taken.
+Refusal not_trusted() {
+  return {400, "malformed",
+          "the connection begins with the PROXY protocol, and trusted_proxies does not list the address it "
+          "comes from"};
+}
+
 }  // namespace
 
 std::string HttpWire::remote() {
@@ -40,6 +47,25 @@ WireStream HttpWire::take() {
   return std::move(stream_);
 }
 
+asio::awaitable<std::optional<ProxyHeader>> HttpWire::take_proxy_header() {
+  const auto deadline = SteadyClock::now() + limits_.head_time;
+  for (;;) {
+    auto seen = read_proxy_header(buffered());
+    if (seen.state == ProxyHeader::State::broken) co_return std::nullopt;
+    if (seen.state != ProxyHeader::State::more) {
+      buffer_.consume(seen.size);
+      co_return seen;
+    }
+    idle_ = buffer_.size() == 0;
+    stream_.next_layer().expires_at(deadline);
+    const auto space = buffer_.prepare(k_head_read_bytes);
+    const auto [error, n] = co_await stream_.async_read_some(space, k_wait);
+    idle_ = false;
+    if (error) co_return std::nullopt;
+    buffer_.commit(n);
+  }
+}
+
 asio::awaitable<bool> HttpWire::secure(ssl_st* session) {
   std::unique_ptr<ssl_st, void (*)(ssl_st*)> owned(session, SSL_free);
   if (!owned) co_return false;
@@ -50,10 +76,12 @@ asio::awaitable<bool> HttpWire::secure(ssl_st* session) {
   idle_ = true;
   const auto deadline = SteadyClock::now() + limits_.tls_handshake;
   stream_.next_layer().expires_at(deadline);
-  const auto space = buffer_.prepare(k_head_read_bytes);
-  const auto [no_hello, n] = co_await stream_.async_read_some(space, k_wait);
-  if (no_hello) co_return false;
-  buffer_.commit(n);
+  if (buffer_.size() == 0) {
+    const auto space = buffer_.prepare(k_head_read_bytes);
+    const auto [no_hello, n] = co_await stream_.async_read_some(space, k_wait);
+    if (no_hello) co_return false;
+    buffer_.commit(n);
+  }
   if (const auto bytes = buffered(); bytes.front() >= 'A' && bytes.front() <= 'Z') {
     const std::string answer = speaks_https();
     const bool sent = co_await write(answer, {});
@@ -82,6 +110,8 @@ asio::awaitable<HttpWire::Head> HttpWire::read_head(bool first, const std::atomi
   bool started = buffer_.size() != 0;
   auto deadline = SteadyClock::now() + (first || started ? limits_.head_time : limits_.keep_alive);
   for (;;) {
+    if (first && read_proxy_header(buffered()).state == ProxyHeader::State::whole)
+      co_return Head{0, not_trusted()};
     // RFC 9112 section 2.2: an empty line before the request line is a habit of old clients.
     while (scan.scanned == 0 && buffered().starts_with("\r\n")) buffer_.consume(2);
     if (const auto bytes = buffered(); !bytes.empty() && !(bytes == "\r" && scan.scanned == 0)) {

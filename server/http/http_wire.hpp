@@ -10,6 +10,7 @@
 
 #include "server/http/limits.hpp"
 #include "server/http/net.hpp"
+#include "server/http/proxy_header.hpp"
 #include "server/http/rate_floor.hpp"
 #include "server/http/request_check.hpp"
 #include "server/http/request_parser.hpp"
@@ -26,6 +27,9 @@ class HttpWire {
   auto executor() { return stream_.get_executor(); }
   std::string remote();
   void close();
+  /// What the connection begins with, where a trusted proxy may say for whom it connects; a header is taken
+  /// off. nullopt: the connection is over.
+  asio::awaitable<std::optional<ProxyHeader>> take_proxy_header();
   /// The handshake of TLS with `session`, which it takes. False: the connection is over. Who speaks plain
   /// HTTP here gets a plain answer that says so; garbage gets none.
   asio::awaitable<bool> secure(ssl_st* session);

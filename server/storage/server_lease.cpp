@@ -72,6 +72,18 @@ class ServerLease::Line {
 
 namespace {
 
+/// In one column with the name, so that a newer server can say it before it changes the tables.
+constexpr std::string_view k_reached_at = " at ";
+std::string shown(const LeaseWish& wish) {
+  return wish.url.empty() ? wish.server : wish.server + std::string(k_reached_at) + wish.url;
+}
+void waits(const LeaseWish& wish, std::string_view holder) {
+  if (!wish.waits) return;
+  const auto at = holder.find(k_reached_at);
+  const bool reached = at != std::string_view::npos;
+  wish.waits(holder.substr(0, at), reached ? holder.substr(at + k_reached_at.size()) : std::string_view());
+}
+
 struct Attempt {
   std::optional<std::int64_t> fence;
   std::optional<Error> refused;
@@ -87,7 +99,7 @@ Attempt attempt(PostgresConnection& c, const LeaseWish& wish) {
   }
   {
     Query take(c, k_take_lease);
-    take << wish.server << ns(wish.lease);
+    take << shown(wish) << ns(wish.lease);
     out.fence = take.returned();
   }
   if (out.fence) return out;
@@ -131,7 +143,7 @@ Result<std::unique_ptr<ServerLease>> ServerLease::take(const std::string& addres
         return std::unique_ptr<ServerLease>(new ServerLease(std::move(line), std::move(wish), *made.fence));
       }
       if (!wish.standby && SteadyClock::now() > patience) return held_by(made.holder);
-      if (wish.standby && wish.waits && named != made.holder) wish.waits(named = made.holder);
+      if (wish.standby && named != made.holder) waits(wish, named = made.holder);
     } catch (const SqlError& error) {
       if (!wish.standby || named.empty()) return sql::to_error(error);  // else it comes back
     }

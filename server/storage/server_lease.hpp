@@ -20,12 +20,14 @@ inline constexpr const char* k_server_sessions = "anchord server";
 /// How a server wants to have a PostgreSQL database.
 struct LeaseWish {
   std::string server;   ///< its name, for people
+  std::string url{};    ///< where other servers reach it; empty: they do not
   bool standby{false};  ///< wait for as long as another one has it
   std::chrono::milliseconds lease{5'000};
   int newest_schema{0};            ///< version of the newest tables that it can use; 0: any
   std::function<bool()> stopping;  ///< asked while it waits
-  std::function<void(std::string_view other)> waits;  ///< once: who has it
-  std::function<void(std::string_view why)> lost;     ///< once, from another thread: it must end now
+  /// For each that has it while this one waits: its name, and where it is reached.
+  std::function<void(std::string_view other, std::string_view url)> waits;
+  std::function<void(std::string_view why)> lost;  ///< once, from another thread: it must end now
 };
 
 /// The right of one server to a PostgreSQL database: a row with a fencing number, renewed by the database's

@@ -179,3 +179,45 @@ test('Caddy with the sample of the documentation', async () => {
   writeFileSync(at('Caddyfile'), `{\n\tadmin off\n\tauto_https disable_redirects\n}\n${site}`);
   await behind('/usr/bin/caddy', ['run', '--adapter', 'caddyfile', '--config', at('Caddyfile')], port, everything);
 });
+
+test('HAProxy that passes bytes on says who connected, by both versions of the PROXY protocol', async () => {
+  for (const word of ['send-proxy', 'send-proxy-v2']) {
+    const port = await free_tcp_port(),
+      stats = await free_tcp_port();
+    writeFileSync(
+      at('tcp.cfg'),
+      `defaults\n mode tcp\n timeout connect 2s\n timeout client 30s\n timeout server 30s\n` +
+        `listen anchord\n bind 127.0.0.1:${port}\n server one 127.0.0.1:${server.port} ${word} check\n` +
+        `listen stats\n mode http\n bind 127.0.0.1:${stats}\n stats enable\n stats uri /\n`,
+    );
+    const haproxy = spawn('haproxy', ['-f', at('tcp.cfg'), '-db'], { stdio: 'ignore' });
+    try {
+      const name = `by ${word}`,
+        client = `127.0.0.${word.length}`;
+      // From another address of the loopback network, which is no trusted proxy.
+      const ask = () =>
+        new Promise((done) =>
+          execFile(
+            'curl',
+            [
+              ...['-sS', '--max-time', '10', '--interface', client, '-H', `Authorization: Bearer ${server.token}`],
+              ...['-H', 'Content-Type: application/json', '-H', 'X-Forwarded-For: 192.0.2.66'],
+              ...['-d', JSON.stringify({ name, roles: ['viewer'] }), `http://127.0.0.1:${port}/api/v1/tokens`],
+            ],
+            (error, stdout) => done(error ? null : JSON.parse(stdout)),
+          ),
+        );
+      let made;
+      await eventually(`${word}: HAProxy answers`, async () => (made = await ask()) !== null);
+      assert.equal(made.name, name, JSON.stringify(made));
+      const audit = await (await server.fetch('/api/v1/audit?limit=50')).json();
+      assert.ok(
+        audit.items.some((row) => row.from === client),
+        JSON.stringify(audit.items.slice(-3)),
+      );
+      assert.ok(!JSON.stringify(audit).includes('192.0.2.66'), 'a client cannot say for whom it asks');
+    } finally {
+      haproxy.kill('SIGTERM');
+    }
+  }
+});

@@ -6,6 +6,7 @@
 #include <memory>
 
 #include "core/base/time.hpp"
+#include "server/http/proxy_header.hpp"
 #include "tests/server/http/echo_peer.hpp"
 #include "tests/server/http/http_fixture.hpp"
 #include "tests/server/tls/certificate_folder.hpp"
@@ -144,6 +145,44 @@ TEST(TlsSession, TellsHandlersThatItIsSecureAndBelievesNobodyElse) {
   RawSocket proxy(behind.port);
   proxy.send(claim);
   EXPECT_EQ(body_of(proxy.response()), "<https>");
+}
+
+TEST(TlsSession, TakesTheClientFromTheHeaderOfATrustedProxyAlone) {
+  const auto who = [](api::Request& r) { return ProbeGateway::text("<" + r.remote + ">"); };
+  const std::string from_7 = "PROXY TCP4 192.0.2.7 192.0.2.1 5000 443\r\n",
+                    from_9 = "PROXY TCP4 192.0.2.9 192.0.2.1 5000 443\r\n";
+  auto options = quick_options();
+  options.is_proxy = [](std::string_view address) {
+    return address == "127.0.0.1" || address == "192.0.2.9";
+  };
+  TestServer behind(options);
+  behind.gateway.handler = who;
+  behind.start();
+  const auto answer = [&](const std::string& header) {
+    RawSocket socket(behind.port);
+    socket.send(header + k_get);
+    return socket.response();
+  };
+  EXPECT_EQ(body_of(answer("")), "<127.0.0.1>");
+  EXPECT_EQ(body_of(answer(from_7)), "<192.0.2.7>");
+  EXPECT_EQ(body_of(answer(from_9 + from_7)), "<192.0.2.7>") << "one proxy behind another";
+  EXPECT_EQ(status_of(answer(from_7 + from_9)), 400) << "a client's own header is none";
+  EXPECT_EQ(body_of(answer(server::proxy_header("2001:db8::7", 1, "2001:db8::1", 2))), "<2001:db8::7>");
+  RawSocket broken(behind.port);
+  broken.send("PROXY TCP4 somebody\r\n" + std::string(k_get));
+  EXPECT_TRUE(broken.read_to_end(seconds(5)));
+  EXPECT_EQ(broken.input, "");
+  RawSocket silent(behind.port);
+  EXPECT_TRUE(silent.read_to_end(seconds(10))) << "it has the time of a head";
+
+  TestServer open;
+  open.gateway.handler = who;
+  open.start();
+  RawSocket stranger(open.port);
+  stranger.send(from_7 + k_get);
+  const auto refused = stranger.response();
+  EXPECT_EQ(status_of(refused), 400);
+  EXPECT_THAT(refused, HasSubstr("trusted_proxies does not list"));
 }
 
 TEST(TlsSession, AnswersPlainHttpInPlainHttp) {

@@ -94,7 +94,7 @@ class Waiting {
  public:
   using Start = std::function<Result<std::unique_ptr<T>>(const LeaseWish&)>;
   Waiting(Start start, LeaseWish wish) {
-    wish.waits = [this](std::string_view) { stands_by_.set_value(); };
+    wish.waits = [this](std::string_view, std::string_view) { stands_by_.set_value(); };
     wish.stopping = [this] { return stopping_.load(); };
     thread_ = Thread("waiting", [this, start, wish] { ended_.set_value(start(wish)); });
   }
