@@ -154,7 +154,11 @@ test('when the one that has the database is killed the other one says so, takes 
   for (let i = 0; i < 20; ++i) await send();
   assert.equal(acknowledged, 2000);
   await holder.kill();
-  await eventually('the other one takes the rows', async () => (await send(), acknowledged >= 2500), 30_000, 50);
+  const taken = async () => {
+    await send();
+    return acknowledged >= 2500;
+  };
+  await eventually('the other one takes the rows', taken, 30_000, 50);
   assert.ok(unreachable > 0, 'it answered in between');
   await there(waiting);
   const page = await (await waiting.fetch(`/api/v1/ranges?mission=${id}&count=exact&limit=1`)).json();
