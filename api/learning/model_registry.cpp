@@ -121,7 +121,9 @@ Result<void> ModelRegistry::reload() {
   BOOST_OUTCOME_TRY(const auto promotions, source_.store().active());
   std::map<std::string, ModelId> wanted;
   ml::Correction how = ml::Correction::weighted;
+  std::uint64_t newest = 0;
   for (const auto& one : promotions) {
+    newest = std::max(newest, one.number);
     if (one.task == k_correction_task)
       how = ml::k_correction_words.find(one.reason).value_or(how);
     else if (one.model)
@@ -138,6 +140,7 @@ Result<void> ModelRegistry::reload() {
     next.correction = how;
     next.fault = loaded.error().message;
   }
+  next.newest = newest;
   // The models of before end after the lock: every range of a flight takes it.
   (void)active_.exchange(std::make_shared<const Active>(std::move(next)));
   return boost::outcome_v2::success();

@@ -35,12 +35,14 @@ class ModelRegistry {
     std::array<std::optional<ModelId>, 4> ids{};  ///< the same, by ml::Task
     ml::Correction correction{ml::Correction::weighted};
     bool needs_cir{false};
-    std::string fault{};  ///< why a promoted model is not in use
+    std::uint64_t newest{0};  ///< number of the newest promotion; 0: none
+    std::string fault{};      ///< why a promoted model is not in use
   };
   /// Never null.
   std::shared_ptr<const Active> active() const;
-  /// After a promotion, and at the start. A model that cannot be used leaves its task without one, and
-  /// `fault` says so.
+  /// After a promotion, at the start, and where the store has a newer one: a promotion whose answer was lost
+  /// on the way from the database took place all the same. A model that cannot be used leaves its task
+  /// without one, and `fault` says so.
   Result<void> reload();
 
   const ModelSource& source() const { return source_; }

@@ -33,8 +33,9 @@ struct Standing {
     const auto at = models.find(model.task);
     return at != models.end() && at->second == model.id;
   }
-  std::string etag() const { return "\"m-" + std::to_string(newest) + '"'; }
 };
+
+std::string etag_of(std::uint64_t newest) { return "\"m-" + std::to_string(newest) + '"'; }
 
 Standing standing(LearningApi& l) {
   Standing out;
@@ -42,13 +43,14 @@ Standing standing(LearningApi& l) {
     out.newest = std::max(out.newest, one.number);
     if (one.model) out.models[one.task] = *one.model;
   }
+  if (l.models.active()->newest < out.newest) value_or_problem(l.models.reload());
   return out;
 }
 
 /// If-Match of GET /models/active is optional; the store holds every decision to the state it was made on.
 Standing standing_for(LearningApi& l, const Request& request) {
   auto now = standing(l);
-  if (!request.header("if-match").empty()) require_match(request, now.etag());
+  if (!request.header("if-match").empty()) require_match(request, etag_of(now.newest));
   return now;
 }
 
@@ -138,8 +140,7 @@ Response artifact(LearningApi& l, const Request& request) {
   return response;
 }
 
-Ordered active_json(LearningApi& l) {
-  const auto active = l.models.active();
+Ordered active_json(LearningApi& l, const std::shared_ptr<const ModelRegistry::Active>& active) {
   Ordered models = Ordered::object();
   for (const char* task : {"nlos_id", "los_bias", "nlos_bias", "bias"}) {
     const auto at = active->models.find(task);
@@ -157,9 +158,10 @@ Ordered active_json(LearningApi& l) {
 }
 
 Response active_answer(LearningApi& l) {
-  const auto now = standing(l);
-  Response response = json_response(200, active_json(l));
-  response.header("ETag", now.etag());
+  (void)standing(l);
+  const auto active = l.models.active();  // of one moment: its ETag is that of another state otherwise
+  Response response = json_response(200, active_json(l, active));
+  response.header("ETag", etag_of(active->newest));
   return response;
 }
 
@@ -237,6 +239,14 @@ GateReport gate_report(LearningApi& l, const Standing& now, const ModelSource::A
   return report;
 }
 
+/// By itself. A store that is away is no fault of the model: the request may be sent again.
+ModelRegistry::Active usable(LearningApi& l, const StoredModel& stored) {
+  auto loaded = load_models(l.models.source(), {{stored.task, stored.id}}, ml::Correction::weighted, false);
+  if (!loaded && loaded.error().code != Errc::storage_unavailable)
+    throw_problem(422, "unsupported", loaded.error().message);
+  return value_or_problem(std::move(loaded));
+}
+
 Response promote(LearningApi& l, const Request& request) {
   check_query(request, {});
   const auto candidate = value_or_problem(l.models.source().artifact(path_id<ModelId>(request)));
@@ -250,10 +260,7 @@ Response promote(LearningApi& l, const Request& request) {
                   "no range of a flight can feed the model: none has " + lacking +
                       "; train without it, or use the model only with predict and evaluate");
   // One that live ranges cannot be judged by would ground the others with it.
-  if (const auto able =
-          load_models(l.models.source(), {{stored.task, stored.id}}, ml::Correction::weighted, false);
-      !able)
-    throw_problem(422, "unsupported", able.error().message);
+  (void)usable(l, stored);
   const auto gate = gate_report(l, before, candidate);
   if (!gate.passed && reason.empty())
     throw_problem(422, "state", gate.why + " (give a reason to promote it anyway)");
@@ -350,9 +357,7 @@ Response predict(LearningApi& l, const Request& request) {
   std::shared_ptr<const ModelRegistry::Active> models = l.models.active();
   if (request.params.at("id") != "active") {
     const auto stored = value_or_problem(l.stores.models.model(path_id<ModelId>(request)));
-    auto loaded = load_models(l.models.source(), {{stored.task, stored.id}}, ml::Correction::weighted, false);
-    if (!loaded) throw_problem(422, "unsupported", loaded.error().message);
-    models = std::make_shared<const ModelRegistry::Active>(std::move(loaded).value());
+    models = std::make_shared<const ModelRegistry::Active>(usable(l, stored));
   }
   auto chosen = *models;
   chosen.correction = correction.value_or(chosen.correction);

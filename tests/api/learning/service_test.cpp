@@ -243,6 +243,20 @@ TEST_F(LearningService, OneOfEightPromotionsAndRollbacksOfOneStateIsMade) {
             none["model"]);
 }
 
+TEST_F(LearningService, APromotionWhoseAnswerWasLostBehindItsCommitIsActive) {
+  ASSERT_EQ(promote(train("los_bias", "constant"), R"({"reason":"first"})").status, 200);
+  const auto second = train("los_bias", "none");
+  Promotion lost;
+  lost.task = "los_bias";
+  lost.model = ModelId{parse_uuid(second.value("model", "").substr(15)).value()};
+  lost.time = clock_.now();
+  ASSERT_TRUE(database_->stores().models.promote(lost, 1));
+  const auto answer = get("/api/v1/models/active");
+  EXPECT_EQ(header(answer, "ETag"), "\"m-2\"");
+  EXPECT_EQ("/api/v1/models/" + json(answer)["models"]["los_bias"].value("id", ""), second["model"])
+      << "the ETag is of this promotion, and the body of the one before";
+}
+
 /// Artifacts that left the server, and what comes back.
 class SignedModels : public LearningService {
  protected:
