@@ -270,8 +270,15 @@ struct TextHash {
   std::size_t operator()(std::string_view text) const { return std::hash<std::string_view>{}(text); }
 };
 
+/// PostgreSQL ends its wait for a synchronous standby at a time limit, and reports that as a warning of a
+/// commit that went well: the rows are on its own disk only, and gone where that standby becomes the primary.
+void note_warning(void* warned, const PGresult* notice) {
+  const char* state = PQresultErrorField(notice, PG_DIAG_SQLSTATE);
+  if (state != nullptr && std::string_view(state).starts_with("01")) *static_cast<bool*>(warned) = true;
+}
+
 /// The address may say otherwise: it stands behind these.
-PGconn* connect(const std::string& address, const char* name) {
+PGconn* connect(const std::string& address, const char* name, const PostgresConnection::Patience& patience) {
   constexpr std::array keywords{"connect_timeout",
                                 "tcp_user_timeout",
                                 "keepalives_idle",
@@ -281,8 +288,15 @@ PGconn* connect(const std::string& address, const char* name) {
                                 "dbname",
                                 "client_encoding",
                                 static_cast<const char*>(nullptr)};
-  const std::array values{
-      "5", "10000", "10", "5", "3", name, address.c_str(), "UTF8", static_cast<const char*>(nullptr)};
+  const std::array values{patience.connect_s,
+                          patience.unacknowledged_ms,
+                          "10",
+                          "5",
+                          "3",
+                          name,
+                          address.c_str(),
+                          "UTF8",
+                          static_cast<const char*>(nullptr)};
   static_assert(keywords.size() == std::tuple_size_v<decltype(values)>);
   return PQconnectdbParams(keywords.data(), values.data(), 1);
 }
@@ -290,22 +304,23 @@ PGconn* connect(const std::string& address, const char* name) {
 }  // namespace
 
 struct PostgresConnection::State {
-  State(const std::string& address, const char* name) : connection(connect(address, name)) {}
+  State(const std::string& address, const char* name, const Patience& patience)
+      : connection(connect(address, name, patience)) {}
   PGconn* get() const { return connection.get(); }
+  bool warned{false};  ///< by what is executed; outlives the connection, which writes it
   std::unique_ptr<PGconn, Finish> connection;
   Parsed parsed;
   std::unordered_map<std::string, std::unique_ptr<PostgresStatement>, TextHash, std::equal_to<>> statements;
 };
 
-PostgresConnection::PostgresConnection(const std::string& address, const char* name)
-    : state_(std::make_unique<State>(address, name)) {
+PostgresConnection::PostgresConnection(const std::string& address, const char* name, const Patience& patience)
+    : state_(std::make_unique<State>(address, name, patience)) {
   PGconn* const c = state_->get();
   if (c == nullptr) throw SqlError(Failure::unavailable, "database: no memory for a connection");
   const std::string where = "database " + shown_address(address) + ": ";
   if (PQstatus(c) != CONNECTION_OK)
     throw SqlError(Failure::unavailable, where + first_line(PQerrorMessage(c)) + password_advice(c));
-  PQsetNoticeProcessor(
-      c, [](void*, const char*) {}, nullptr);  // it would write to the terminal
+  PQsetNoticeReceiver(c, note_warning, &state_->warned);  // libpq's own writes to the terminal
   if (PQserverVersion(c) < k_least_version)
     throw SqlError(Failure::unavailable, where + "this is PostgreSQL " +
                                              std::to_string(PQserverVersion(c) / 10000) +
@@ -433,10 +448,13 @@ bool PostgresConnection::in_transaction() const {
 
 void PostgresConnection::commit() {
   state_->parsed = {};
+  state_->warned = false;
   const Answer answer(PQexec(state_->get(), "COMMIT"));
   check(state_->get(), answer.get());
   if (std::string_view(PQcmdStatus(const_cast<PGresult*>(answer.get()))) != "COMMIT")
     throw SqlError(Failure::internal, "database: the transaction was rolled back instead of committed");
+  if (state_->warned)
+    throw SqlError(Failure::unavailable, "database: no synchronous standby has confirmed the commit in time");
 }
 
 }  // namespace anchord::sql

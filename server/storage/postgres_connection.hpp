@@ -14,8 +14,15 @@ class PostgresArrays;
 /// before its first row is read.
 class PostgresConnection final : public Connection {
  public:
+  /// How long packets may stay without an acknowledgement before the connection is given up, and what a new
+  /// one waits for each host; an address may give others.
+  struct Patience {
+    const char *unacknowledged_ms, *connect_s;
+  };
+  static constexpr Patience k_usual{"10000", "5"};
   /// Blocks at most some seconds. Throws SqlError. name: of the session, where the address gives none
-  explicit PostgresConnection(const std::string& address, const char* name = "anchord");
+  explicit PostgresConnection(const std::string& address, const char* name = "anchord",
+                              const Patience& patience = k_usual);
   ~PostgresConnection() override;
 
   Statement& prepared(std::string_view sql) override;
@@ -25,7 +32,7 @@ class PostgresConnection final : public Connection {
 
   bool usable() const;  ///< the server was there when it was last spoken to
   bool in_transaction() const;
-  /// Throws also where PostgreSQL answers a COMMIT by undoing.
+  /// Throws also where PostgreSQL answers a COMMIT by undoing, or did not wait for its synchronous standby.
   void commit();
 
   struct State;  ///< of the .cpp file

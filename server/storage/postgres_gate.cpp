@@ -27,6 +27,10 @@ std::string lease_text(std::int64_t fence) {
   return fence == 0 ? "" : "; SELECT assert_server(" + std::to_string(fence) + ")";
 }
 
+/// Makes a transaction that writes nothing wait for the standby too. A row whose commit the standby has not
+/// confirmed is there for who sends it again, as a duplicate, and must not be acknowledged for that.
+constexpr const char* k_wait_for_standby = "; SELECT pg_logical_emit_message(true, 'anchord', '')";
+
 /// Longer with every attempt, and never the same for two that met.
 void pause_before(int attempt) {
   const auto odd = static_cast<int>(SteadyClock::now().time_since_epoch().count() % 7);
@@ -164,18 +168,40 @@ std::optional<Error> PostgresGate::write(std::size_t rows, const Work& work) {
   return error;
 }
 
+std::optional<Error> PostgresGate::transaction(const Work& work) {
+  std::uint64_t unconfirmed = 0;
+  bool confirm = false;
+  {
+    const auto shared = shared_.lock();
+    unconfirmed = shared->unconfirmed;
+    confirm = shared->confirmed < unconfirmed;
+  }
+  std::optional<Error> error;
+  writers_.run(confirm ? begin_write_ + k_wait_for_standby : begin_write_,
+               [&](PostgresConnection& connection) {
+                 error = work(connection);
+                 if (error) return connection.execute("ROLLBACK");
+                 try {
+                   connection.commit();
+                 } catch (const SqlError& failed) {
+                   auto shared = shared_.lock();
+                   if (failed.failure() == Failure::unavailable) ++shared->unconfirmed;
+                   throw;
+                 }
+               });
+  if (confirm && !error) {
+    auto shared = shared_.lock();
+    shared->confirmed = std::max(shared->confirmed, unconfirmed);
+  }
+  return error;
+}
+
 std::optional<Error> PostgresGate::attempt(std::size_t rows, const Work& work) {
   for (int n = 1;; ++n) {
     const auto start = SteadyClock::now();
     std::optional<Error> error;
     try {
-      writers_.run(begin_write_, [&](PostgresConnection& connection) {
-        error = work(connection);
-        if (error)
-          connection.execute("ROLLBACK");
-        else
-          connection.commit();
-      });
+      error = transaction(work);
     } catch (const SqlError& failed) {
       if (failed.failure() != Failure::contended || n >= k_attempts) throw;
       count_repeat();

@@ -77,9 +77,13 @@ class PostgresGate final : public Gate {
   struct Shared {
     Status status;
     Since waiting;  ///< since when each write that is under way is
+    /// Commits that ended without an answer or without the standby, the process before's counted as one;
+    /// those before a commit that the standby has confirmed.
+    std::uint64_t unconfirmed{1}, confirmed{0};
   };
   std::optional<Error> enter(std::size_t rows, Since::const_iterator& entry);
   std::optional<Error> attempt(std::size_t rows, const Work& work);
+  std::optional<Error> transaction(const Work& work);
   void note(const SqlError& trouble);
   void count_repeat();
 

@@ -14,6 +14,9 @@ using sql::Query;
 using sql::SqlError;
 using SteadyClock = std::chrono::steady_clock;
 
+/// A database that is gone without a word must be noticed within the lease, or the one that stands by asks a
+/// machine that is no longer there while another one has become the primary.
+constexpr PostgresConnection::Patience k_patience{"2000", "2"};
 constexpr auto k_try_every = std::chrono::milliseconds(500);
 /// A standby that was not heard of for this long is none.
 constexpr std::int64_t k_heard_ns = 30'000'000'000;
@@ -56,7 +59,7 @@ class ServerLease::Line {
   /// A transaction. Throws SqlError.
   template <class Act>
   auto run(Act act) {
-    if (!connection_) connection_ = std::make_unique<PostgresConnection>(address_);
+    if (!connection_) connection_ = std::make_unique<PostgresConnection>(address_, "anchord", k_patience);
     auto connection = std::move(connection_);
     connection->execute(k_begin_lease);
     auto out = act(*connection);

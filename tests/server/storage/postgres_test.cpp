@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <future>
 
 #include "core/base/guard.hpp"
 #include "server/storage/postgres_gate.hpp"
@@ -428,6 +429,55 @@ TEST(PostgresOutage, IsStalledWhileTheServerAnswersNothingAndLosesNothing) {
   EXPECT_TRUE(stored);
   EXPECT_TRUE(until(StorageLevel::ok)) << db->health().reason;
   EXPECT_EQ(db->stores().missions.mission(other.id).value().id, other.id);
+}
+
+/// PostgreSQL reports a commit also where its wait for the synchronous standby was canceled. Were that, or
+/// the row that is there from then on, acknowledged, it would be lost with a failover to that standby.
+TEST(PostgresStandby, WhatItHasNotConfirmedIsNotAcknowledgedNorIsItsRepetition) {
+  if (!PostgresServer::installed()) GTEST_SKIP() << postgresql_missing();
+  PostgresServer server;
+  PostgresOptions options;
+  options.address = server.address("postgres");
+  const ScratchDir dir;
+  options.data_dir = dir.path();
+  const auto db = open_postgres(options).value();
+  Mission mission;
+  mission.id = MissionId{make_uuid_v7(k_noon)};
+  mission.created = k_noon;
+  ASSERT_TRUE(db->stores().missions.insert(mission));
+  const auto appended = [&] {
+    return db->stores().measurements.append_ranges({range_at(mission.id, 1)}, false);
+  };
+  server.execute("ALTER SYSTEM SET synchronous_standby_names = 'one_that_is_away'");
+  server.end(SIGINT);
+  server.begin();
+  PostgresConnection beside(server.address("postgres"));
+  /// How often a commit was waiting for the standby, and was canceled.
+  const auto canceled = [&] {
+    Query query(
+        beside,
+        "SELECT count(*) FROM (SELECT pid FROM pg_stat_activity WHERE wait_event = 'SyncRep' OFFSET 0) w "
+        "WHERE pg_cancel_backend(w.pid)");
+    return query.step() ? query.integer() : 0;
+  };
+
+  for (const char* what : {"a row", "the same again, which is there by now", "and again"}) {
+    // Until it has waited: a moment after the restart nothing is sent yet.
+    for (std::int64_t waited = 0; waited == 0;) {
+      auto answer = std::async(std::launch::async, appended);
+      while (answer.wait_for(std::chrono::milliseconds(20)) != std::future_status::ready)
+        waited += canceled();
+      const auto got = answer.get();
+      ASSERT_FALSE(got) << what;
+      EXPECT_EQ(got.error().code, Errc::storage_unavailable) << what;
+    }
+  }
+
+  server.execute("ALTER SYSTEM RESET synchronous_standby_names");
+  server.execute("SELECT pg_reload_conf()");
+  const auto answer = appended();
+  ASSERT_TRUE(answer) << answer.error().message;
+  EXPECT_EQ(answer.value().front(), RowOutcome::duplicate);
 }
 
 TEST(PostgresOutage, ARestartBetweenTwoCallsIsNotNoticed) {
