@@ -1,11 +1,13 @@
 #include "api/kit/idempotency.hpp"
 
 #include <array>
+#include <limits>
 
 #include "api/kit/problem.hpp"
 #include "api/kit/router.hpp"
 #include "core/base/sha256.hpp"
 #include "core/ports/access_store.hpp"
+#include "core/ports/request_mark.hpp"
 
 namespace anchord::api {
 namespace {
@@ -51,6 +53,33 @@ class Running {
   std::string name_;
   bool first_{false};
 };
+
+using Handler = std::function<Response(Request&)>;
+
+/// By `handler`. Cut off behind something that it wrote, by the end of this server or of the database's
+/// connection, it leaves a mark: it is not done again.
+Response handled(AccessStore& answers, std::int64_t ran_ns, Request& request, Keeps keeps,
+                 const Handler& handler) {
+  // Rows have identities and commands numbers of their own: they may be sent again.
+  if (keeps == Keeps::always) return handler(request);
+  StoredAnswer begun;
+  begun.key = std::string(request.header("idempotency-key"));
+  begun.principal = request.principal.token_id;
+  begun.created_ran_ns = ran_ns;
+  Response response;
+  {
+    const RequestMark mark(begun);
+    response = handler(request);
+  }
+  // Rejected after all: what it wrote until then is no answer, and it may be sent again.
+  if (response.status >= 400 && response.status < 500) {
+    const auto left = answers.answer(begun.principal, begun.key);
+    begun.created_ran_ns = std::numeric_limits<std::int64_t>::min() / 2;
+    if (left && left.value() && left.value()->status == 0)
+      (void)answers.keep_answer(begun, begun.created_ran_ns).has_value();
+  }
+  return response;
+}
 
 }  // namespace
 
@@ -141,6 +170,11 @@ Response Idempotency::run(Request& request, Keeps keeps, const std::function<Res
   if (!stored) return problem_of(stored.error());
   const auto& kept = stored.value();
   if (kept && running_ns_() - kept->created_ran_ns < k_keep_ns) {
+    if (kept->status == 0)
+      return problem(
+          409, "conflict",
+          "the first request with this Idempotency-Key was carried out, at least in part, and its answer "
+          "was lost with its server: read what is there, and send what is missing with another key");
     if (request.body_stream != nullptr) {
       HashingReader reader(*request.body_stream, hash);
       drain(reader);
@@ -172,12 +206,12 @@ Response Idempotency::run(Request& request, Keeps keeps, const std::function<Res
   if (request.body_stream != nullptr) {
     HashingReader reader(*request.body_stream, hash);
     request.body_stream = &reader;
-    response = handler(request);
+    response = handled(answers_, running_ns_(), request, keeps, handler);
     drain(reader);
     request.body_stream = nullptr;
   } else {
     hash.add(request.body);
-    response = handler(request);
+    response = handled(answers_, running_ns_(), request, keeps, handler);
   }
   if (response.status < 400 && !response.body_stream) keep(request, response, hash.hex());
   return response;

@@ -15,7 +15,7 @@ constexpr const char* k_keep =
     "UPDATE "
     "SET request_sha256_hex = excluded.request_sha256_hex, status = excluded.status, body = excluded.body, "
     "created_t_ns = excluded.created_t_ns, location = excluded.location, etag = excluded.etag "
-    "WHERE stored_answer.created_t_ns < ?9 RETURNING status";
+    "WHERE stored_answer.created_t_ns < ?9 OR stored_answer.status = 0 RETURNING status";
 constexpr const char* k_use =
     "SELECT count(*), ifnull(sum(length(body)), 0) FROM stored_answer WHERE principal = ?1";
 constexpr const char* k_drop =
@@ -77,12 +77,8 @@ class SqlAccessStore final : public AccessStore {
     });
   }
   Result<void> keep_answer(const StoredAnswer& answer, std::int64_t expired_ran_ns) override {
-    return write_void(gate_, [&](Connection& c) -> std::optional<Error> {
-      Query query(c, k_keep);
-      query << answer.principal << answer.key << answer.request_sha256_hex << answer.status
-            << std::as_bytes(std::span{answer.body}) << answer.created_ran_ns << answer.location
-            << answer.etag << expired_ran_ns;
-      if (query.returned()) return std::nullopt;
+    return unmarked([&](Connection& c) -> std::optional<Error> {
+      if (put_answer(c, answer, expired_ran_ns)) return std::nullopt;
       return make_error(Errc::conflict, "an answer is kept under this key already");
     });
   }
@@ -105,7 +101,7 @@ class SqlAccessStore final : public AccessStore {
     return drop([&](Query& query) { query << principal << row_limit(most); }, k_drop_oldest);
   }
   Result<void> append_audit(const AuditEntry& entry) override {
-    return write_void(gate_, [&](Connection& c) -> std::optional<Error> {
+    return unmarked([&](Connection& c) -> std::optional<Error> {
       std::int64_t number = 0;
       std::string before;
       {
@@ -156,6 +152,13 @@ class SqlAccessStore final : public AccessStore {
   }
 
  private:
+  /// Of what is done for a request, neither its answer nor its line in the log is a part.
+  Result<void> unmarked(const Work& work) {
+    auto error = gate_.write(1, work);
+    gate_.changed();
+    if (error) return *std::move(error);
+    return boost::outcome_v2::success();
+  }
   template <class Bind>
   Result<std::size_t> drop(Bind bind, const char* text) {
     return write_value<std::size_t>(gate_, 1, [&](Connection& c) -> Result<std::size_t> {
@@ -170,6 +173,14 @@ class SqlAccessStore final : public AccessStore {
 };
 
 }  // namespace
+
+bool put_answer(Connection& c, const StoredAnswer& answer, std::int64_t expired_ran_ns) {
+  Query query(c, k_keep);
+  query << answer.principal << answer.key << answer.request_sha256_hex << answer.status
+        << std::as_bytes(std::span{answer.body}) << answer.created_ran_ns << answer.location << answer.etag
+        << expired_ran_ns;
+  return query.returned().has_value();
+}
 
 std::unique_ptr<AccessStore> make_access_store(Gate& gate) { return std::make_unique<SqlAccessStore>(gate); }
 

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "core/base/check.hpp"
+#include "core/ports/request_mark.hpp"
 
 namespace anchord::sql {
 
@@ -60,8 +61,18 @@ Uuid Query::uuid() {
   return id;
 }
 
+Work marked(Work work) {
+  const StoredAnswer* begun = RequestMark::current();
+  if (begun == nullptr) return work;
+  return [work = std::move(work), begun](Connection& c) -> std::optional<Error> {
+    if (auto error = work(c)) return error;
+    (void)put_answer(c, *begun, begun->created_ran_ns);
+    return std::nullopt;
+  };
+}
+
 Result<void> write_void(Gate& gate, const Work& work, std::size_t rows) {
-  auto error = gate.write(rows, work);
+  auto error = gate.write(rows, marked(work));
   gate.changed();
   if (error) return *std::move(error);
   return boost::outcome_v2::success();

@@ -19,6 +19,10 @@
 #include "core/base/time.hpp"
 #include "core/types/document.hpp"
 
+namespace anchord {
+struct StoredAnswer;
+}
+
 /// The seam between the stores and the database: stores are written once against it, each database implements
 /// it once. SQL texts use ?1, ?2 ... in order, ON CONFLICT, RETURNING and ifnull, and nothing else that only
 /// one database knows.
@@ -241,16 +245,22 @@ class Gate {
   std::atomic<std::uint64_t> changes_{0};
 };
 
+/// `work`, and in its transaction the mark of the request that this thread writes for, where there is one
+/// (core/ports/request_mark.hpp).
+Work marked(Work work);
+/// False where the principal has a younger answer under this key.
+bool put_answer(Connection& c, const StoredAnswer& answer, std::int64_t expired_ran_ns);
+
 /// Runs `work` (Connection& -> Result<T>) through the gate.
 template <class T, class F>
 Result<T> write_value(Gate& gate, std::size_t rows, F work) {
   std::optional<T> value;
-  auto error = gate.write(rows, [&](Connection& c) -> std::optional<Error> {
-    Result<T> result = work(c);
-    if (!result) return result.error();
-    value = std::move(result).value();
-    return std::nullopt;
-  });
+  auto error = gate.write(rows, marked([&](Connection& c) -> std::optional<Error> {
+                            Result<T> result = work(c);
+                            if (!result) return result.error();
+                            value = std::move(result).value();
+                            return std::nullopt;
+                          }));
   gate.changed();
   if (error) return *std::move(error);
   return *std::move(value);

@@ -13,6 +13,7 @@
 #include "core/ports/access_store.hpp"
 #include "core/ports/measurement_store.hpp"
 #include "core/ports/mission_bin.hpp"
+#include "core/ports/request_mark.hpp"
 #include "core/ports/token_store.hpp"
 #include "kept_fixture.hpp"
 
@@ -441,6 +442,25 @@ TEST_F(KeptAnswers, WhatWasRefusedOrOnlyTriedIsNotKept) {
   const auto again = keyed("/api/v1/missions", R"({"name":"x","frame":"local","track_point":"body"})", "k");
   EXPECT_EQ(again.status, 201) << "the corrected request, under the same key";
   EXPECT_EQ(database_->stores().access.answer_use("tester").value().count, 1u);
+}
+
+/// As a server leaves it that ends behind the commit of what was asked for, and before it has kept its
+/// answer.
+TEST_F(KeptAnswers, WhatWasDoneIsNotDoneAgainWhereTheServerEndedBeforeItAnswered) {
+  const std::string body = R"({"name":"x","frame":"local","track_point":"body"})";
+  ASSERT_EQ(keyed("/api/v1/missions", body, "k").status, 201);
+  ASSERT_TRUE(database_->stores().access.drop_oldest_answers("tester", 10));
+  StoredAnswer begun;
+  begun.principal = "tester", begun.key = "k";
+  {
+    const RequestMark mark(begun);
+    ASSERT_EQ(post("/api/v1/sites", R"({"name":"y","origin":{"lon":3.7,"lat":51,"h_m":50}})").status, 201);
+  }
+  const auto again = keyed("/api/v1/missions", body, "k");
+  EXPECT_EQ(again.status, 409);
+  EXPECT_THAT(again.body, HasSubstr("read what is there"));
+  EXPECT_EQ(json(get("/api/v1/missions"))["items"].size(), 1u);
+  EXPECT_EQ(keyed("/api/v1/missions", body, "another").status, 201);
 }
 
 TEST_F(KeptAnswers, ATokenHasAQuotaThatNeverStandsInTheWayOfACommand) {

@@ -1,5 +1,6 @@
 #include "core/ports/access_store.hpp"
 #include "core/ports/job_store.hpp"
+#include "core/ports/request_mark.hpp"
 #include "core/ports/token_store.hpp"
 #include "tests/server/storage/backends.hpp"
 
@@ -107,6 +108,36 @@ TEST_P(AccessContract, KeepsOneAnswerForAPrincipalAndKey) {
   EXPECT_EQ(db_->stores().access.drop_oldest_answers("me", 2).value(), 2u);
   EXPECT_TRUE(db_->stores().access.answer("me", "4").value()) << "the youngest stays";
   EXPECT_EQ(db_->stores().access.answer_use("me").value().count, 1u);
+}
+
+/// What a thread writes for a request leaves the mark with it or not at all, and its answer takes the place
+/// of that.
+TEST_P(AccessContract, MarksWhatARequestWritesInTheSameTransaction) {
+  auto& access = db_->stores().access;
+  StoredAnswer begun;
+  begun.principal = "gate", begun.key = "k", begun.created_ran_ns = 5;
+  const auto status = [&] {
+    const auto found = access.answer("gate", "k").value();
+    return found ? found->status : -1;
+  };
+  Token token{TokenId{make_uuid_v7(k_noon)}, "gate", std::string(64, 'a'), {"viewer"}, k_noon, {}, {}, {}};
+  ASSERT_TRUE(db_->stores().tokens.insert(token));
+  {
+    const RequestMark mark(begun);
+    EXPECT_FALSE(db_->stores().tokens.insert(token)) << "it is there already";
+    ASSERT_TRUE(access.append_audit({UtcTime{1}, "gate", "will do", "here", ""}));
+    EXPECT_EQ(status(), -1) << "nothing was done";
+  }
+  ASSERT_TRUE(db_->stores().tokens.touch(token.id, UtcTime{6}));
+  EXPECT_EQ(status(), -1) << "written for nobody";
+  const RequestMark mark(begun);
+  ASSERT_TRUE(db_->stores().tokens.touch(token.id, UtcTime{7}));
+  EXPECT_EQ(status(), 0);
+  StoredAnswer done = begun;
+  done.status = 201;
+  ASSERT_TRUE(access.keep_answer(done, 0));
+  EXPECT_EQ(status(), 201);
+  EXPECT_EQ(access.keep_answer(done, 0).error().code, Errc::conflict) << "an answer stays";
 }
 
 TEST_P(AccessContract, ChainsTheAuditLog) {
