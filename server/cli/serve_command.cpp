@@ -2,8 +2,13 @@
 #include <sys/stat.h>
 
 #include <CLI/CLI.hpp>
+#include <chrono>
+#include <condition_variable>
 #include <cstdio>
+#include <cstdlib>
 
+#include "core/base/guard.hpp"
+#include "core/base/locked.hpp"
 #include "core/base/text.hpp"
 #include "server/app/app.hpp"
 #include "server/cli/commands.hpp"
@@ -15,6 +20,41 @@
 
 namespace anchord::cli {
 namespace {
+
+constexpr auto k_end_within = std::chrono::seconds(10);
+
+/// One that another server has taken over from can store nothing more, and what it still waits for may never
+/// answer: a commit whose standby is away, a database that is cut off. It must end to be started again.
+class LastResort {
+ public:
+  explicit LastResort(bool armed) {
+    if (!armed) return;
+    thread_ = Thread("anchord-end", [this] {
+      auto ended = ended_.lock();
+      if (ended.wait_for(wake_, k_end_within, [](bool done) { return done; })) return;
+      server::log(server::LogLevel::error, "ended without what it waited for: the database does not answer");
+      // The log is written by another thread.
+      (void)ended.wait_for(wake_, std::chrono::seconds(1), [](bool done) { return done; });
+      std::_Exit(1);
+    });
+  }
+  ~LastResort() {
+    if (!thread_.joinable()) return;
+    {
+      auto ended = ended_.lock();
+      *ended = true;
+    }
+    wake_.notify_all();
+    thread_.join();
+  }
+  LastResort(const LastResort&) = delete;
+  LastResort& operator=(const LastResort&) = delete;
+
+ private:
+  Locked<bool> ended_;
+  std::condition_variable wake_;
+  Thread thread_;
+};
 
 int serve(const server::Config& config) {
   block_signals({SIGTERM, SIGINT, SIGHUP});
@@ -53,7 +93,10 @@ int serve(const server::Config& config) {
   }
   server::log(server::LogLevel::info, "stopping", {{"signal", received == SIGINT ? "SIGINT" : "SIGTERM"}});
   (void)server::notify_service_manager("STOPPING=1");
-  app.value()->stop();
+  {
+    const LastResort last(app.value()->taken_over());
+    app.value()->stop();
+  }
   server::log(server::LogLevel::info, "stopped");
   return app.value()->taken_over() ? 1 : 0;
 }

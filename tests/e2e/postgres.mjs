@@ -1,6 +1,6 @@
 // A PostgreSQL of the test's own: its folder, a port that the system chose, passwords asked for, and its end by process id.
 import { execFileSync, spawn } from 'node:child_process';
-import { chmodSync, chownSync, mkdirSync, mkdtempSync, rmSync, writeFileSync } from 'node:fs';
+import { chmodSync, chownSync, mkdirSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
 import { connect } from 'node:net';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
@@ -89,6 +89,13 @@ export class Postgres {
   async stop() {
     this.child?.kill('SIGINT');
     await this.exited;
+  }
+
+  /** To it and every session. SIGSTOP: connections stay and nothing is answered, until SIGCONT. */
+  signalAll(signal) {
+    const { pid } = this.child,
+      sessions = readFileSync(`/proc/${pid}/task/${pid}/children`, 'utf8').trim().split(/\s+/);
+    for (const one of [pid, ...sessions.map(Number)]) process.kill(one, signal);
   }
 
   /** What one statement prints, columns apart by a bar. */

@@ -228,6 +228,27 @@ test('a database that cuts off all its sessions, as by a restart, ends neither o
   assert.equal(waiting.child.exitCode, null);
 });
 
+test('one whose database answers nothing ends although a write of it is under way, and the other one takes over', async () => {
+  const ended = holder,
+    mission = await made_mission('hangs'),
+    renewed = () => postgres.psql("SELECT lease_t_ns FROM server_lease WHERE standby <> ''", 'anchord');
+  const before_it = await eventually('another one is seen to stand by', renewed);
+  await eventually('the holder has seen it too', async () => (await renewed()) !== before_it);
+  postgres.signalAll('SIGSTOP');
+  try {
+    assert.equal(await sent(mission, 1, 1), false);
+    await eventually('it ends', () => ended.child.exitCode !== null, 60_000, 100);
+  } finally {
+    postgres.signalAll('SIGCONT');
+  }
+  assert.equal(ended.child.exitCode, 1);
+  await eventually('its last line', () => ended.log.includes('ended without what it waited for'));
+  await waiting.there;
+  await found();
+  assert.ok(await sent(mission, 1, 1));
+  await change_places(ended);
+});
+
 test('while the database is away for longer than the lease the holder ends, and the other one takes over when it is back', async () => {
   const ended = holder,
     renewed = () => postgres.psql("SELECT lease_t_ns FROM server_lease WHERE standby <> ''", 'anchord');
