@@ -112,35 +112,41 @@ void TagTrack::index() {
 }
 
 std::size_t TagTrack::span_of(double t_s) const {
-  return std::min(static_cast<std::size_t>((t_s - times_s_.front()) * spans_per_s_), poses_.size() - 1);
+  const auto span = static_cast<std::int64_t>((t_s - times_s_.data()[0]) * spans_per_s_);
+  return std::min(static_cast<std::size_t>(span), times_s_.size() - 1);
 }
 
 std::size_t TagTrack::after(double t_s) const {
-  if (poses_.empty() || t_s < times_s_.front()) return 0;
-  if (!(t_s < times_s_.back())) return poses_.size();
-  const std::size_t span = span_of(t_s);
-  const auto at = [this](std::size_t pose) { return times_s_.begin() + static_cast<std::ptrdiff_t>(pose); };
-  const auto found = std::upper_bound(at(spans_[span]), at(spans_[span + 1]), t_s);
-  return static_cast<std::size_t>(found - times_s_.begin());
+  // Asked for every range in every round: no bounds are checked twice.
+  const double* const times_s = times_s_.data();
+  const std::size_t n = times_s_.size();
+  if (n == 0 || t_s < times_s[0]) return 0;
+  if (!(t_s < times_s[n - 1])) return n;
+  const std::uint32_t* const span = spans_.data() + span_of(t_s);
+  const double *from = times_s + span[0], *const to = times_s + span[1];
+  constexpr std::ptrdiff_t k_few = 8;
+  if (to - from > k_few) return static_cast<std::size_t>(std::upper_bound(from, to, t_s) - times_s);
+  while (from < to && *from <= t_s) ++from;
+  return static_cast<std::size_t>(from - times_s);
 }
 
 TrackInterval TagTrack::interval_at(double t_s) const {
   const std::size_t next = after(t_s);
   if (next == 0) return {.refused = TrackRefusal::outside};
-  const TrackPose& before = poses_[next - 1];
-  if (next == poses_.size()) {
+  const TrackPose* const before = poses_.data() + (next - 1);
+  if (next == times_s_.size()) {
     // The last epoch itself is not an extrapolation.
-    if (before.t_s < t_s) return {.refused = TrackRefusal::outside};
-    if (before.fix < min_fix_) return {.refused = TrackRefusal::fix_class};
-    return {TrackRefusal::none, &before, &before, 0.0};
+    if (before->t_s < t_s) return {.refused = TrackRefusal::outside};
+    if (before->fix < min_fix_) return {.refused = TrackRefusal::fix_class};
+    return {TrackRefusal::none, before, before, 0.0};
   }
-  const TrackPose& later = poses_[next];
-  const double interval_s = later.t_s - before.t_s, share = (t_s - before.t_s) / interval_s;
-  const double missed_m = 4.0 * share * (1.0 - share) * missed_midway_m_[next];
+  const double *const around_s = times_s_.data() + (next - 1), interval_s = around_s[1] - around_s[0];
+  const double share = (t_s - around_s[0]) / interval_s;
+  const double missed_m = 4.0 * share * (1.0 - share) * missed_midway_m_.data()[next];
   if (max_gap_s_ ? interval_s > *max_gap_s_ : missed_m > k_most_missed_m)
     return {.refused = TrackRefusal::gap};
-  if (before.fix < min_fix_ || later.fix < min_fix_) return {.refused = TrackRefusal::fix_class};
-  return {TrackRefusal::none, &before, &later, missed_m};
+  if (before[0].fix < min_fix_ || before[1].fix < min_fix_) return {.refused = TrackRefusal::fix_class};
+  return {TrackRefusal::none, before, before + 1, missed_m};
 }
 
 TagPoint TagTrack::at(double t_s, const Eigen::Vector3d& lever_arm_body_m) const {

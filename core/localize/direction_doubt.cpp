@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/localize/column_factor.hpp"
 #include "core/localize/joint_lines.hpp"
 #include "core/localize/widen.hpp"
 
@@ -76,30 +77,25 @@ std::vector<Stretch> stretches_of(const FlightRows& flight, const FlightOptions&
 
 /// All stretches of an anchor, and what is known of them without a field.
 struct Stretches {
-  Eigen::Matrix<double, Eigen::Dynamic, k_field_unknowns> by;
-  Eigen::VectorXd residual_m;
-  Eigen::VectorXd noise_m2;
-  Eigen::MatrixXd alike_in_time, alike;
+  /// Of each the residual, then by what it changes.
+  std::vector<ColumnFactor::Beside> beside;
+  std::vector<double> noise_m2, alike_in_time, alike;  ///< the last two as ColumnFactor has its columns
+  ColumnFactor factor;
 
-  Stretches(const std::vector<Stretch>& stretches, double noise_m2_each) {
-    const auto n = static_cast<Eigen::Index>(stretches.size());
-    by.resize(n, k_field_unknowns);
-    residual_m.resize(n);
-    noise_m2.resize(n);
-    alike_in_time.resize(n, n);
-    alike.resize(n, n);
-    for (Eigen::Index i = 0; i < n; ++i) {
-      const Stretch& a = stretches[static_cast<std::size_t>(i)];
-      by.row(i) = a.by.transpose();
-      residual_m[i] = a.residual_m;
-      for (Eigen::Index k = 0; k <= i; ++k) {
-        const Stretch& b = stretches[static_cast<std::size_t>(k)];
+  Stretches(const std::vector<Stretch>& stretches, double noise_m2_each) : factor(stretches.size()) {
+    const std::size_t n = stretches.size(), stride = factor.stride();
+    alike_in_time.resize(n * stride);
+    alike.resize(n * stride);
+    for (std::size_t k = 0; k < n; ++k) {
+      const Stretch& b = stretches[k];
+      beside.emplace_back() << b.residual_m, b.by;
+      noise_m2.push_back(noise_m2_each / b.n);
+      for (std::size_t i = k; i < n; ++i) {
+        const Stretch& a = stretches[i];
         const double apart_rad = std::acos(std::clamp(a.way.dot(b.way), -1.0, 1.0));
-        alike(i, k) = alike(k, i) = std::exp(-apart_rad / k_field_alike_rad);
-        alike_in_time(i, k) = alike_in_time(k, i) =
-            std::exp(-std::abs(a.t_s - b.t_s) / k_error_correlation_s);
+        alike[k * stride + i] = std::exp(-apart_rad / k_field_alike_rad);
+        alike_in_time[k * stride + i] = std::exp(-std::abs(a.t_s - b.t_s) / k_error_correlation_s);
       }
-      noise_m2[i] = noise_m2_each / a.n;
     }
   }
 };
@@ -113,23 +109,22 @@ struct FieldAnswer {
 
 using FieldInformation = Eigen::Matrix<double, k_field_unknowns, k_field_unknowns>;
 
-FieldAnswer field_answer_of(const Stretches& stretches, double slow_m, double size_m,
+FieldAnswer field_answer_of(Stretches& stretches, double slow_m, double size_m,
                             const FieldInformation& prior) {
-  Eigen::MatrixXd errors_m2 = slow_m * slow_m * stretches.alike_in_time + size_m * size_m * stretches.alike;
-  errors_m2.diagonal() += stretches.noise_m2;
-  const Eigen::LLT<Eigen::MatrixXd> errors(errors_m2);
+  ColumnFactor& errors = stretches.factor;
+  errors.factor(slow_m * slow_m, stretches.alike_in_time, size_m * size_m, stretches.alike,
+                stretches.noise_m2, stretches.beside);
+  const ColumnFactor::Products products = errors.products();
   // Walls are never early: the mean of what they do is about as large as what it differs by.
   const double delay_information = 1.0 / (1.0 / prior(3, 3) + size_m * size_m);
-  const Eigen::VectorXd weighed = errors.solve(stretches.residual_m);
-  FieldInformation normal = stretches.by.transpose() * errors.solve(stretches.by) + prior;
+  FieldInformation normal = products.bottomRightCorner<k_field_unknowns, k_field_unknowns>() + prior;
   normal(3, 3) += delay_information - prior(3, 3);
   const Eigen::LLT<FieldInformation> solver(normal);
-  const FieldUnknowns pull = stretches.by.transpose() * weighed;
+  const FieldUnknowns pull = products.bottomLeftCorner<k_field_unknowns, 1>();
   const FieldUnknowns step = solver.solve(pull);
-  const auto log_root = [](const auto& factor) { return factor.matrixLLT().diagonal().array().log().sum(); };
   FieldAnswer answer;
-  answer.log_likelihood = -log_root(errors) - log_root(solver) + 0.5 * std::log(delay_information) -
-                          0.5 * (stretches.residual_m.dot(weighed) - pull.dot(step));
+  answer.log_likelihood = -errors.log_diagonal() - solver.matrixLLT().diagonal().array().log().sum() +
+                          0.5 * std::log(delay_information) - 0.5 * (products(0, 0) - pull.dot(step));
   answer.moved_m = step.head<3>();
   answer.covariance_m2 = solver.solve(Eigen::Matrix<double, k_field_unknowns, 3>::Identity()).topRows<3>();
   return answer;
@@ -151,7 +146,7 @@ FieldInformation field_prior(const FlightRows& flight, const FlightOptions& opti
 }
 
 /// Where the place may be, all sizes weighed. No field is as likely as one, of whatever size.
-Eigen::Matrix3d field_held_m2(const Stretches& stretches, const FieldInformation& prior,
+Eigen::Matrix3d field_held_m2(Stretches& stretches, const FieldInformation& prior,
                               const Eigen::Matrix3d& claimed_m2) {
   std::vector<std::pair<double, FieldAnswer>> answers;
   for (const double slow_m : k_field_slow_m)
@@ -184,8 +179,8 @@ std::size_t add_direction_doubt(const FlightRows& flight, const FlightOptions& o
     const AnchorBlock& block = fit.normal.anchors[i];
     // Where neighbours are too far apart to show it, all of the scatter may be noise.
     const double white_share = block.white_share > 0 ? block.white_share : 1.0;
-    const Stretches stretches(few, std::max(white_share * block.scale_m * block.scale_m,
-                                            options.min_scale_m * options.min_scale_m));
+    Stretches stretches(few, std::max(white_share * block.scale_m * block.scale_m,
+                                      options.min_scale_m * options.min_scale_m));
     const FieldInformation prior = field_prior(flight, options, fit, i);
     Eigen::Matrix4d& covariance_m2 = fit.anchor_covariance[i];
     const Eigen::Matrix4d before_m2 = covariance_m2;

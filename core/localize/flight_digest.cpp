@@ -1,11 +1,41 @@
 #include "core/localize/flight_digest.hpp"
 
+#include <array>
+#include <bit>
+
 #include "core/base/sha256.hpp"
 
 namespace anchord {
+namespace {
+
+/// Numbers as Sha256 takes them, many at a time: each call of OpenSSL costs more than the number.
+class Gathered {
+ public:
+  void add(std::uint64_t value) {
+    for (int i = 0; i < 8; ++i)
+      bytes_[n_++] = static_cast<char>(static_cast<unsigned char>(value >> (8 * i)));
+    if (n_ == bytes_.size()) flush();
+  }
+  void add(double value) { add(std::bit_cast<std::uint64_t>(value + 0.0)); }
+  std::string hex() {
+    flush();
+    return sha_.hex();
+  }
+
+ private:
+  void flush() {
+    sha_.add(std::string_view{bytes_.data(), n_});
+    n_ = 0;
+  }
+  Sha256 sha_;
+  std::array<char, 4096> bytes_{};
+  std::size_t n_{0};
+};
+
+}  // namespace
 
 std::string flight_digest(const FlightData& flight) {
-  Sha256 sha;
+  Gathered sha;
   const auto add_time = [&](UtcTime time) { sha.add(static_cast<std::uint64_t>(time.ns)); };
   for (const Fix& fix : flight.fixes) {
     add_time(fix.time);

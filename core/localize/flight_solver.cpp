@@ -10,7 +10,7 @@
 #include "core/localize/flight_checks.hpp"
 #include "core/localize/flight_digest.hpp"
 #include "core/localize/flight_verdict.hpp"
-#include "core/localize/joint_model.hpp"
+#include "core/localize/joint_rounds.hpp"
 #include "core/localize/kit_prior.hpp"
 #include "core/localize/region_reason.hpp"
 #include "core/localize/scatter_doubt.hpp"
@@ -31,6 +31,7 @@ struct Work {
   FlightOptions options{};  ///< in the frame of the rows
   JointFit fit{};
   JointStart start{};  ///< by `prior`, of which it asks the mean alone
+  JointNormal at_start{};
   SharedPrior prior{};
   ProfileFactor factor{};
   ProfileFactor alone{};  ///< what the flight said before it was told anything
@@ -85,10 +86,12 @@ bool shows_antennas_apart(const Work& work) {
 
 Result<void> solve_with(Work& work, const SharedPrior& prior) {
   const FlightOptions& options = work.options;
-  if (work.start.searches.empty() || work.prior.mean != prior.mean)
+  if (work.start.searches.empty() || work.prior.mean != prior.mean) {
     work.start = joint_start(work.rows, prior, options);
+    work.at_start = normal_at_start(work.rows, work.start.state, options);
+  }
   work.prior = prior;
-  BOOST_OUTCOME_TRY(work.fit, solve_joint(work.rows, work.start.state, prior, options));
+  BOOST_OUTCOME_TRY(work.fit, solve_joint_from(work.rows, work.start.state, work.at_start, prior, options));
   work.factor = profile_factor(work.fit, prior, work.name);
   work.factor.digest = work.digest;
   return boost::outcome_v2::success();

@@ -30,6 +30,7 @@ class JointLines {
     antenna_x,
     antenna_y,
     antenna_z,
+    stamp,  ///< of the row, seconds
     n_columns
   };
 
@@ -41,6 +42,12 @@ class JointLines {
   std::span<const JointRow* const> rows() const { return rows_; }
   std::span<const double> of(Column column) const { return {begin(column), size()}; }
   std::span<double> of(Column column) { return {values_.get() + column * padded_, size()}; }
+  /// All of them: without attitude, by which `forward` and `left` are nothing; of antennas without an arm of
+  /// their own, or with the same; of one antenna of one tag; without an error model.
+  bool level() const { return level_; }
+  bool one_arm() const { return one_arm_; }
+  bool one_antenna() const { return one_antenna_; }
+  bool without_models() const { return without_models_; }
   /// One of them as linearise() gives it.
   JointLine line(std::size_t i) const;
   /// The others by TrackRefusal.
@@ -54,6 +61,7 @@ class JointLines {
   std::size_t padded_{};
   std::unique_ptr<double[]> values_;
   std::array<std::size_t, 4> refused_{};
+  bool level_{true}, one_arm_{true}, one_antenna_{true}, without_models_{true};
 };
 
 /// Weights by Tukey's loss of rows without an error model.

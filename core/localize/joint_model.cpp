@@ -3,8 +3,9 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
-#include <optional>
+#include <memory>
 #include <span>
 #include <utility>
 
@@ -21,10 +22,11 @@ constexpr double k_least_slow_m = 0.05;   // no radio in the air was seen with l
 constexpr double k_believed_white = 0.9;  // the share is an estimate; too much of it claims too much
 
 /// Time the rows cover, pauses of more than 2 s left out.
-double duration_s(std::span<const JointRow* const> rows) {
+double duration_s(std::span<const double> stamps_s) {
+  const double* const t_s = stamps_s.data();
   double sum_s = 0;
-  for (std::size_t i = 1; i < rows.size(); ++i) {
-    const double step_s = rows[i]->t_s - rows[i - 1]->t_s;
+  for (std::size_t i = 1; i < stamps_s.size(); ++i) {
+    const double step_s = t_s[i] - t_s[i - 1];
     if (step_s <= 2.0) sum_s += step_s;
   }
   return std::max(sum_s, 1.0);
@@ -34,25 +36,38 @@ double duration_s(std::span<const JointRow* const> rows) {
 /// antenna by itself; without enough neighbours within half a second nothing is known, and nothing claimed.
 class Neighbours {
  public:
-  explicit Neighbours(std::size_t most) { jumps_m_.reserve(most); }
+  explicit Neighbours(std::size_t most) : jumps_m_(std::make_unique_for_overwrite<double[]>(most)) {}
   void add(const JointRow& row, double residual_m) {
     const std::pair antenna{row.tag, row.antenna};
     if (!newest_ || newest_->first != antenna) newest_ = &*last_.try_emplace(antenna).first;
-    auto& last = newest_->second;
-    if (last && row.t_s - last->first <= 0.5) jumps_m_.push_back(std::abs(residual_m - last->second));
-    last = {row.t_s, residual_m};
+    follow(newest_->second, row.t_s, residual_m);
+  }
+  /// The rows of one antenna that weigh something.
+  void add_all(std::span<const double> stamps_s, std::span<const double> residuals_m,
+               std::span<const double> weights) {
+    Before before;
+    for (std::size_t i = 0; i < weights.size(); ++i)
+      if (weights.data()[i] > 0) follow(before, stamps_s.data()[i], residuals_m.data()[i]);
   }
   double white_share(double scale2) {
-    if (jumps_m_.size() < 50) return 0.0;
-    const double jump_m = 1.4826 * upper_median(jumps_m_);
+    if (n_ < 50) return 0.0;
+    const double jump_m = 1.4826 * upper_median({jumps_m_.get(), n_});
     return std::min(0.5 * jump_m * jump_m / scale2, 1.0);
   }
 
  private:
-  using Last = std::map<std::pair<NetworkId, std::uint8_t>, std::optional<std::pair<double, double>>>;
+  struct Before {
+    double t_s{-std::numeric_limits<double>::infinity()}, residual_m{};
+  };
+  void follow(Before& before, double t_s, double residual_m) {
+    if (t_s - before.t_s <= 0.5) jumps_m_[n_++] = std::abs(residual_m - before.residual_m);
+    before = {t_s, residual_m};
+  }
+  using Last = std::map<std::pair<NetworkId, std::uint8_t>, Before>;
   Last last_;
   Last::value_type* newest_{nullptr};  ///< most ranges are of the antenna of the one before
-  std::vector<double> jumps_m_;
+  std::unique_ptr<double[]> jumps_m_;
+  std::size_t n_{0};
 };
 
 /// How much of what the error models claim may be claimed: 1 as long as the errors are what the model said.
@@ -129,7 +144,15 @@ std::vector<double> weigh(const AnchorTask& task, JointLines& lines, AnchorBlock
   const double believed = task.claims ? believed_share(lines) : 1.0;
   std::vector<double> weights = robust_weights(task, block, lines);
   double sum_square = 0;
-  for (std::size_t i = 0; i < lines.size(); ++i) {
+  if (lines.without_models()) {
+    const double* const residual_m = lines.of(JointLines::residual).data();
+    for (std::size_t i = 0; i < weights.size(); ++i) {
+      const double counted = weights.data()[i];
+      block.sum_weight += counted;
+      sum_square += counted * residual_m[i] * residual_m[i];
+    }
+  }
+  for (std::size_t i = 0; i < lines.size() && !lines.without_models(); ++i) {
     double& residual_m = lines.of(JointLines::residual)[i];
     double counted = weights[i], counted_m = residual_m;
     if (const RangeErrorModel* model = lines.rows()[i]->error_model) {
@@ -159,7 +182,7 @@ void build_anchor(const AnchorTask& task, AnchorBlock& block, JointNormal& norma
   block.last_t_s = std::max(block.last_t_s, lines.rows().back()->t_s);
   std::vector<double> centred_m, sorted;
   centred_m.assign(lines.of(JointLines::residual).begin(), lines.of(JointLines::residual).end());
-  for (std::size_t i = 0; i < centred_m.size(); ++i)
+  for (std::size_t i = 0; i < centred_m.size() && !lines.without_models(); ++i)
     if (const RangeErrorModel* model = lines.rows()[i]->error_model) centred_m[i] -= expected_error_m(*model);
   // The MAD holds the usual position error already; only what a row has beyond that makes it count less.
   sorted.assign(lines.of(JointLines::variance).begin(), lines.of(JointLines::variance).end());
@@ -171,17 +194,22 @@ void build_anchor(const AnchorTask& task, AnchorBlock& block, JointNormal& norma
   }
   const std::vector<double> weights = weigh(task, lines, block);
   Neighbours neighbours(lines.size());
-  sorted.clear();
-  for (std::size_t i = 0; i < lines.size(); ++i) {
-    if (!(weights[i] > 0)) continue;
-    neighbours.add(*lines.rows()[i], centred_m[i]);
-    sorted.push_back(std::abs(centred_m[i]));
+  if (lines.one_antenna()) {
+    neighbours.add_all(lines.of(JointLines::stamp), centred_m, weights);
+  } else {
+    for (std::size_t i = 0; i < lines.size(); ++i)
+      if (weights[i] > 0) neighbours.add(*lines.rows()[i], centred_m[i]);
   }
-  block.n_used = sorted.size();
+  for (std::size_t i = 0; i < weights.size(); ++i) {
+    // No branch: the next takes the place of what weighs nothing.
+    sorted.data()[block.n_used] = std::abs(centred_m.data()[i]);
+    block.n_used += weights.data()[i] > 0 ? 1 : 0;
+  }
+  sorted.resize(block.n_used);
   block.n_rejected = lines.size() - block.n_used;
   if (block.n_rejected > 0) block.refused["outlier"] = block.n_rejected;
   const double alike =
-      std::max(1.0, 2.0 * options.correlation_s * block.sum_weight / duration_s(lines.rows()));
+      std::max(1.0, 2.0 * options.correlation_s * block.sum_weight / duration_s(lines.of(JointLines::stamp)));
   // The mean over a correlation time keeps what is shared and averages the rest.
   block.white_share = neighbours.white_share(block.scale_m * block.scale_m);
   const double slow_share =

@@ -3,13 +3,15 @@
 #include <cmath>
 #include <limits>
 
-#include "core/localize/joint_model.hpp"
+#include "core/localize/joint_rounds.hpp"
 
 namespace anchord {
 namespace {
 
 constexpr int k_max_rounds = 60;
 constexpr int k_scale_rounds = 20;
+// Wide at first: the scale of residuals far from the answer says nothing about the noise.
+constexpr double k_first_floor_m = 0.5, k_second_floor_m = 0.25;
 
 double clipped(double value, double limit) { return std::clamp(value, -limit, limit); }
 
@@ -89,8 +91,17 @@ void fill_covariances(const FlightRows& flight, const SharedPrior& prior, const 
 
 }  // namespace
 
+JointNormal normal_at_start(const FlightRows& flight, const JointState& start, const FlightOptions& options) {
+  return build_normal(flight, start, options, k_first_floor_m);
+}
+
 Result<JointFit> solve_joint(const FlightRows& flight, const JointState& start, const SharedPrior& prior,
                              const FlightOptions& options) {
+  return solve_joint_from(flight, start, normal_at_start(flight, start, options), prior, options);
+}
+
+Result<JointFit> solve_joint_from(const FlightRows& flight, const JointState& start, JointNormal first,
+                                  const SharedPrior& prior, const FlightOptions& options) {
   JointFit fit;
   fit.state = start;
   // The Gauss-Newton rounds bring every method near; Ceres then does the rest where it is asked for.
@@ -102,11 +113,12 @@ Result<JointFit> solve_joint(const FlightRows& flight, const JointState& start, 
   std::vector<Pace> paces(start.anchors.size());
   for (fit.rounds = 0; fit.rounds < most_rounds && !fit.converged; ++fit.rounds) {
     if (options.canceled && options.canceled()) return make_error(Errc::canceled, "canceled");
-    // Wide at first: the scale of residuals far from the answer says nothing about the noise.
-    const double floor_m = fit.rounds == 0 ? 0.5 : fit.rounds == 1 ? 0.25 : 0.0;
     // Scales measured anew in every round would keep the last millimetres wandering.
-    fit.normal = build_normal(flight, fit.state, options, floor_m,
-                              fit.rounds > k_scale_rounds ? &fit.normal : nullptr);
+    if (fit.rounds == 0)
+      fit.normal = std::move(first);
+    else
+      fit.normal = build_normal(flight, fit.state, options, fit.rounds == 1 ? k_second_floor_m : 0.0,
+                                fit.rounds > k_scale_rounds ? &fit.normal : nullptr);
     const double largest = take_step(flight, prior, options, paces, fit);
     // 0.1 mm; what still moves after many rounds is a direction nothing measures, and its covariance says so.
     const double enough = fit.rounds < 25 ? 1e-4 : 1e-3;

@@ -2,6 +2,7 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdio>
 #include <limits>
@@ -39,6 +40,19 @@ using KnownMatrix = Eigen::Matrix<double, k_asked, k_asked>;
 /// fit may have taken for outliers.
 enum class Weighing : std::uint8_t { as_fitted, wide };
 
+/// Columns of Sums beside those of the lines, and the weights of each weighing; 0 in whole groups of four
+/// beyond the rows. A column that is not asked is empty.
+struct AskedColumns {
+  std::vector<double> ones, near, residual;
+  std::vector<std::vector<double>> weights;
+  std::array<std::vector<double>, k_error_columns> asked{};
+  AskedColumns(std::size_t padded, std::size_t n_weighings)
+      : ones(padded, 1.0),
+        near(padded),
+        residual(padded),
+        weights(n_weighings, std::vector<double>(padded)) {}
+};
+
 /// The normal equations of a fit, to ask them for errors.
 class ErrorTest {
  public:
@@ -49,9 +63,12 @@ class ErrorTest {
     const FlightOptions& options;
     const FlightMiddle& middle;
   };
-  ErrorTest(const Given& given, Weighing weighing);
+  /// With either weighing, from one look at the rows; only: the column that will be asked, all if absent.
+  static std::vector<ErrorTest> of(const Given& given, std::span<const Weighing> weighings,
+                                   const std::optional<std::size_t>& only = std::nullopt);
+  ErrorAnswer ask(const ErrorQuestion& question) const;
   /// since  what the rows were corrected by already: the prior is about the whole
-  ErrorAnswer ask(const ErrorQuestion& question, double since = 0) const;
+  ErrorFinding find(const ErrorQuestion& question, double since = 0) const;
 
  private:
   struct Anchor {
@@ -64,9 +81,21 @@ class ErrorTest {
     Coupling coupling;
     Rest reduced;
   };
-  Anchor anchor_of(std::size_t index, Weighing weighing) const;
+  explicit ErrorTest(const Given& given) : given_(given) {}
+  /// With the weights of each row, for each antenna; those of the lines in whole groups.
+  Anchor anchor_of(std::size_t index, const JointLines& lines, const AskedColumns& columns,
+                   std::span<const double> weights) const;
+  void eliminate();
   /// What is asked, of the ranges of one antenna alone, or of all.
   Part part_of(std::size_t anchor, const std::optional<std::size_t>& antenna) const;
+  /// What is asked, with what is known of it beside.
+  struct Asked {
+    Known with;
+    ErrorFinding found{};
+  };
+  Asked asked_of(const ErrorQuestion& question, double since, std::span<const Part> of_antenna) const;
+  /// Where one antenna is asked: part_of each anchor.
+  std::vector<Part> parts_for(const ErrorQuestion& question) const;
 
   Given given_;
   std::vector<Anchor> anchors_;
@@ -85,62 +114,73 @@ double weight_per_m2(const WeighedRow& by, const JointRow& row, const JointLine&
   return (over2 <= 1 ? 1.0 : 1.0 / over2) / (variance_m2 * block.kappa);
 }
 
-/// Columns of Sums beside those of the lines, and weights: 0 in whole groups of four beyond the rows.
-struct AskedColumns {
-  std::vector<double> ones, near, residual, weight;
-  std::array<std::vector<double>, k_error_columns> asked;
-  explicit AskedColumns(std::size_t padded)
-      : ones(padded, 1.0), near(padded), residual(padded), weight(padded) {
-    asked.fill(std::vector<double>(padded));
-  }
-};
-
 AskedColumns asked_columns(const ErrorTest::Given& given, std::size_t index, const JointLines& lines,
-                           Weighing weighing) {
+                           std::span<const Weighing> weighings, const std::optional<std::size_t>& only) {
   const AnchorBlock& block = given.fit.normal.anchors[index];
   const Eigen::Vector3d& anchor_m = given.fit.state.anchors[index].position_m;
-  AskedColumns out(lines.padded());
+  AskedColumns out(lines.padded(), weighings.size());
+  for (std::size_t k = 0; k < k_error_columns; ++k)
+    if (!only || *only == k) out.asked[k].resize(lines.padded());
   for (std::size_t i = 0; i < lines.size(); ++i) {
     const JointRow& row = *lines.rows()[i];
     JointLine line;
     line.residual_m = lines.of(JointLines::residual)[i];
     line.position_variance_m2 = lines.of(JointLines::variance)[i];
     const WeighedRow by = weighed_row(row, line, block, block.scale_m, given.options);
-    const double weight = weight_per_m2(by, row, line, block, weighing);
-    if (!(weight > 0)) continue;
+    bool counts = false;
+    for (std::size_t k = 0; k < weighings.size(); ++k) {
+      const double weight = weight_per_m2(by, row, line, block, weighings[k]);
+      if (!(weight > 0)) continue;
+      out.weights[k][i] = weight;
+      counts = true;
+    }
+    if (!counts) continue;
     const Eigen::Vector3d antenna_m(lines.of(JointLines::antenna_x)[i], lines.of(JointLines::antenna_y)[i],
                                     lines.of(JointLines::antenna_z)[i]);
     const Eigen::Vector3d to_anchor_m = anchor_m - antenna_m;
     const ErrorColumns columns = error_columns(given.middle, row.t_s, antenna_m.z(), to_anchor_m);
-    for (std::size_t k = 0; k < k_error_columns; ++k) out.asked[k][i] = columns[k];
+    for (std::size_t k = 0; k < k_error_columns; ++k)
+      if (!out.asked[k].empty()) out.asked[k][i] = columns[k];
     out.near[i] = std::min(to_anchor_m.norm(), k_near_m) - k_near_right_m;
     out.residual[i] = by.residual_m;
-    out.weight[i] = weight;
   }
   return out;
 }
 
-/// The rows of one antenna, whose arm of its own, where it has one, is seen as the common one is.
+/// The rows of one antenna, whose arm of its own, where it has one, is seen as the common one is. Columns
+/// that are nothing are left out.
 Sums sums_of_antenna(const JointLines& lines, const AskedColumns& columns, std::span<const double> weights,
                      const std::optional<std::int8_t>& arm) {
   using L = JointLines;
-  constexpr std::size_t k_of_lines = 9, k_distinct = k_of_lines + 1 + k_error_columns + 1;
-  std::array<const double*, k_distinct> distinct{
-      lines.begin(L::x),     lines.begin(L::y),   lines.begin(L::z),     columns.ones.data(),
-      lines.begin(L::curve), lines.begin(L::lag), lines.begin(L::lever), lines.begin(L::forward),
-      lines.begin(L::left),  columns.near.data()};
-  for (std::size_t k = 0; k < k_error_columns; ++k) distinct[k_of_lines + 1 + k] = columns.asked[k].data();
-  distinct.back() = columns.residual.data();
-  constexpr int ones = 3, lever = 6;
+  std::vector<const double*> distinct;
   // Of each column of Sums, among those; -1: nothing.
-  std::array<int, k_own + k_rest> from{0, 1, 2, ones, ones, 4, 5, lever, 7, 8};
-  static_assert(k_own + k_shared_antennas == 10 && k_shared_curve == 1 && k_shared_lag == 2 &&
-                k_shared_lever == 3 && k_shared_forward == 4 && k_shared_left == 5);
-  for (int i = k_own + k_shared_antennas; i < k_own + k_shared_size; ++i)
-    from[static_cast<std::size_t>(i)] = -1;
-  if (arm) from[static_cast<std::size_t>(k_own + k_shared_antennas + *arm)] = lever;
-  for (std::size_t i = 0; k_of_lines + i < k_distinct; ++i)
-    from[k_own + k_near + i] = static_cast<int>(k_of_lines + i);
+  std::array<int, k_own + k_rest> from{};
+  from.fill(-1);
+  const auto put = [&](int column, const double* begin) {
+    from[static_cast<std::size_t>(column)] = static_cast<int>(distinct.size());
+    distinct.push_back(begin);
+  };
+  const auto same = [&](int column, int as) {
+    from[static_cast<std::size_t>(column)] = from[static_cast<std::size_t>(as)];
+  };
+  constexpr int delay = k_own - 1;
+  put(0, lines.begin(L::x));
+  put(1, lines.begin(L::y));
+  put(2, lines.begin(L::z));
+  put(delay, columns.ones.data());
+  same(k_own + k_shared_bias, delay);
+  put(k_own + k_shared_curve, lines.begin(L::curve));
+  put(k_own + k_shared_lag, lines.begin(L::lag));
+  put(k_own + k_shared_lever, lines.begin(L::lever));
+  if (arm) same(k_own + k_shared_antennas + *arm, k_own + k_shared_lever);
+  if (!lines.level()) {
+    put(k_own + k_shared_forward, lines.begin(L::forward));
+    put(k_own + k_shared_left, lines.begin(L::left));
+  }
+  put(k_own + k_near, columns.near.data());
+  for (std::size_t k = 0; k < k_error_columns; ++k)
+    if (!columns.asked[k].empty()) put(k_own + k_asked + static_cast<int>(k), columns.asked[k].data());
+  put(k_own + k_residual, columns.residual.data());
   const std::vector<double> products = weighted_products(distinct, weights);
   Sums out = Sums::Zero();
   for (int i = 0; i < k_own + k_rest; ++i)
@@ -152,25 +192,28 @@ Sums sums_of_antenna(const JointLines& lines, const AskedColumns& columns, std::
   return out;
 }
 
-ErrorTest::Anchor ErrorTest::anchor_of(std::size_t index, Weighing weighing) const {
+ErrorTest::Anchor ErrorTest::anchor_of(std::size_t index, const JointLines& lines,
+                                       const AskedColumns& columns, std::span<const double> weights) const {
   const FlightRows& flight = given_.flight;
   const JointState::Anchor& anchor = given_.fit.state.anchors[index];
   Anchor out;
   out.by_antenna.assign(flight.antennas.size() + 1, Sums::Zero());
-  if (!anchor.active) return out;
-  const JointLines lines(flight.track, flight.anchors[index].rows, given_.fit.state.shared, anchor);
-  const AskedColumns columns = asked_columns(given_, index, lines, weighing);
-  std::vector<std::size_t> antennas;
-  antennas.reserve(lines.size());
-  for (const JointRow* row : lines.rows()) antennas.push_back(antenna_of(flight, *row));
-  std::vector<double> weights(lines.padded());
-  for (std::size_t antenna = 0; antenna < out.by_antenna.size(); ++antenna) {
-    const JointRow* one = nullptr;
-    for (std::size_t i = 0; i < antennas.size(); ++i) {
-      weights[i] = antennas[i] == antenna ? columns.weight[i] : 0.0;
-      if (antennas[i] == antenna) one = lines.rows()[i];
+  if (lines.size() > 0 && lines.one_antenna()) {
+    const JointRow& first = *lines.rows().front();
+    out.by_antenna[antenna_of(flight, first)] = sums_of_antenna(lines, columns, weights, first.arm);
+  } else {
+    std::vector<std::size_t> antennas;
+    antennas.reserve(lines.size());
+    for (const JointRow* row : lines.rows()) antennas.push_back(antenna_of(flight, *row));
+    std::vector<double> own(lines.padded());
+    for (std::size_t antenna = 0; antenna < out.by_antenna.size(); ++antenna) {
+      const JointRow* one = nullptr;
+      for (std::size_t i = 0; i < antennas.size(); ++i) {
+        own[i] = antennas[i] == antenna ? weights[i] : 0.0;
+        if (antennas[i] == antenna) one = lines.rows()[i];
+      }
+      if (one != nullptr) out.by_antenna[antenna] = sums_of_antenna(lines, columns, own, one->arm);
     }
-    if (one != nullptr) out.by_antenna[antenna] = sums_of_antenna(lines, columns, weights, one->arm);
   }
   Eigen::Matrix4d own = Eigen::Matrix4d::Zero();
   for (const Sums& sums : out.by_antenna) own += sums.topLeftCorner<k_own, k_own>();
@@ -205,39 +248,78 @@ SharedPrior with_open_bias(SharedPrior prior) {
   return prior;
 }
 
-ErrorTest::ErrorTest(const Given& given, Weighing weighing) : given_(given) {
-  for (std::size_t i = 0; i < given.flight.anchors.size(); ++i) {
-    anchors_.push_back(anchor_of(i, weighing));
-    reduced_ += parts_.emplace_back(part_of(i, std::nullopt)).reduced;
+std::vector<ErrorTest> ErrorTest::of(const Given& given, std::span<const Weighing> weighings,
+                                     const std::optional<std::size_t>& only) {
+  std::vector<ErrorTest> tests(weighings.size(), ErrorTest(given));
+  const FlightRows& flight = given.flight;
+  for (std::size_t i = 0; i < flight.anchors.size(); ++i) {
+    const JointState::Anchor& anchor = given.fit.state.anchors[i];
+    if (!anchor.active) {
+      for (ErrorTest& test : tests)
+        test.anchors_.emplace_back().by_antenna.assign(flight.antennas.size() + 1, Sums::Zero());
+      continue;
+    }
+    const JointLines lines(flight.track, flight.anchors[i].rows, given.fit.state.shared, anchor);
+    const AskedColumns columns = asked_columns(given, i, lines, weighings, only);
+    for (std::size_t k = 0; k < tests.size(); ++k)
+      tests[k].anchors_.push_back(tests[k].anchor_of(i, lines, columns, columns.weights[k]));
   }
-  const SharedPrior prior = with_open_bias(given.prior);
+  for (ErrorTest& test : tests) test.eliminate();
+  return tests;
+}
+
+void ErrorTest::eliminate() {
+  for (std::size_t i = 0; i < anchors_.size(); ++i)
+    reduced_ += parts_.emplace_back(part_of(i, std::nullopt)).reduced;
+  const SharedPrior prior = with_open_bias(given_.prior);
   gradient_ = reduced_.block<k_asked, 1>(0, k_residual);
-  gradient_.head<k_shared_size>() += prior.information * (prior.mean - given.fit.state.shared);
+  gradient_.head<k_shared_size>() += prior.information * (prior.mean - given_.fit.state.shared);
   KnownMatrix known = reduced_.topLeftCorner<k_asked, k_asked>();
-  shared_.compute(known.topLeftCorner<k_shared_size, k_shared_size>() + given.prior.information);
+  shared_.compute(known.topLeftCorner<k_shared_size, k_shared_size>() + given_.prior.information);
   known.topLeftCorner<k_shared_size, k_shared_size>() += prior.information;
   known(k_near, k_near) += 1.0 / (k_near_prior * k_near_prior);
   known_.compute(known);
 }
 
-ErrorAnswer ErrorTest::ask(const ErrorQuestion& question, double since) const {
-  const int column = k_asked + static_cast<int>(question.column);
+std::vector<ErrorTest::Part> ErrorTest::parts_for(const ErrorQuestion& question) const {
   std::vector<Part> of_antenna;
-  Rest asked = question.anchor ? parts_[*question.anchor].reduced : reduced_;
-  if (question.antenna) {
-    asked.setZero();
-    for (std::size_t i = 0; i < anchors_.size(); ++i)
-      asked += of_antenna.emplace_back(part_of(i, question.antenna)).reduced;
-  }
-  const Known with = asked.block<k_asked, 1>(0, column), followed = known_.solve(with);
-  const double information = std::max(asked(column, column) - with.dot(followed), 0.0);
+  for (std::size_t i = 0; question.antenna && i < anchors_.size(); ++i)
+    of_antenna.push_back(part_of(i, question.antenna));
+  return of_antenna;
+}
+
+ErrorTest::Asked ErrorTest::asked_of(const ErrorQuestion& question, double since,
+                                     std::span<const Part> of_antenna) const {
+  const int column = k_asked + static_cast<int>(question.column);
+  const auto asked = [&](int from, int to) {
+    if (question.anchor) return parts_[*question.anchor].reduced(from, to);
+    double sum = 0;
+    for (const Part& part : of_antenna) sum += part.reduced(from, to);
+    return question.antenna ? sum : reduced_(from, to);
+  };
+  Asked out;
+  for (int i = 0; i < k_asked; ++i) out.with[i] = asked(i, column);
+  const Known followed = known_.solve(out.with);
+  const double information = std::max(asked(column, column) - out.with.dot(followed), 0.0);
   const double score = asked(column, k_residual) - followed.dot(gradient_) + information * since;
   const double with_prior = information + 1.0 / (question.known().prior * question.known().prior);
+  out.found = {score / with_prior, 1.0 / std::sqrt(with_prior), score / std::sqrt(with_prior)};
+  return out;
+}
+
+ErrorFinding ErrorTest::find(const ErrorQuestion& question, double since) const {
+  return asked_of(question, since, parts_for(question)).found;
+}
+
+ErrorAnswer ErrorTest::ask(const ErrorQuestion& question) const {
+  const int column = k_asked + static_cast<int>(question.column);
+  const std::vector<Part> of_antenna = parts_for(question);
+  const Asked asked = asked_of(question, 0, of_antenna);
   ErrorAnswer out;
   out.question = question;
-  out.found = {score / with_prior, 1.0 / std::sqrt(with_prior), score / std::sqrt(with_prior)};
+  out.found = asked.found;
   // The fit followed the error with the prior it has, and without a slope.
-  const SharedVector shared = shared_.solve(with.head<k_shared_size>());
+  const SharedVector shared = shared_.solve(asked.with.head<k_shared_size>());
   for (std::size_t i = 0; i < anchors_.size(); ++i) {
     Eigen::Vector4d own = -(parts_[i].coupling.leftCols<k_shared_size>() * shared);
     if (!question.anchor || *question.anchor == i)
@@ -274,9 +356,11 @@ Result<void> ask_again(const ErrorTest::Given& given, double first, ErrorAnswer&
     const double since = found.value, before_z = std::abs(found.z);
     const FlightRows rows = corrected(given, answer.question, since);
     BOOST_OUTCOME_TRY(const auto again, solve_joint(rows, state, given.prior, given.options));
-    found = ErrorTest({rows, again, given.prior, given.options, given.middle}, Weighing::as_fitted)
-                .ask(answer.question, since)
-                .found;
+    constexpr std::array k_as_fitted{Weighing::as_fitted};
+    found = ErrorTest::of({rows, again, given.prior, given.options, given.middle}, k_as_fitted,
+                          answer.question.column)
+                .front()
+                .find(answer.question, since);
     state = again.state;
     if (std::abs(found.value - since) < 0.05 * found.sigma) break;
     // An error that is there shows the more, the more of it was taken off.
@@ -288,7 +372,9 @@ Result<void> ask_again(const ErrorTest::Given& given, double first, ErrorAnswer&
 
 /// The first are of all ranges, in the order of their columns.
 Result<std::vector<ErrorAnswer>> answers_of(const ErrorTest::Given& given) {
-  const ErrorTest fitted(given, Weighing::as_fitted), wide(given, Weighing::wide);
+  constexpr std::array k_both{Weighing::as_fitted, Weighing::wide};
+  const std::vector<ErrorTest> tests = ErrorTest::of(given, k_both);
+  const ErrorTest &fitted = tests.front(), &wide = tests.back();
   std::vector<ErrorAnswer> answers;
   struct Odd {
     double z{}, first{};
@@ -297,7 +383,7 @@ Result<std::vector<ErrorAnswer>> answers_of(const ErrorTest::Given& given) {
   std::vector<Odd> odd;
   for (const ErrorQuestion& question : error_questions(given.flight, given.fit)) {
     const ErrorAnswer& answer = answers.emplace_back(fitted.ask(question));
-    const ErrorFinding wider = wide.ask(question).found;
+    const ErrorFinding wider = wide.find(question);
     const ErrorFinding& odder = std::abs(wider.z) > std::abs(answer.found.z) ? wider : answer.found;
     odd.push_back({std::abs(odder.z), odder.value, answers.size() - 1});
   }

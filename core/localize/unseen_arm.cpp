@@ -2,6 +2,7 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdio>
 #include <numbers>
@@ -72,15 +73,20 @@ Eigen::Vector3d direction_at(const FlightRows& flight, Heading heading, const Ei
   return length_m > k_least_way_m ? Eigen::Vector3d(way / length_m) : Eigen::Vector3d::Zero();
 }
 
-/// How the fit would answer to an arm that turned with a heading which the track does not have.
-std::vector<AnchorByArm> response_with(Heading heading, const FlightRows& flight, const JointFit& fit,
-                                       const SharedPrior& prior, const FlightOptions& options) {
+/// How the fit would answer to an arm that turned with a heading which the track does not have: every anchor,
+/// for each heading that is asked.
+HeadingResponses responses_without_heading(const FlightRows& flight, const JointFit& fit,
+                                           const SharedPrior& prior, const FlightOptions& options) {
+  constexpr std::array k_headings{Heading::along_course, Heading::to_middle};
   Eigen::Vector3d middle_m = Eigen::Vector3d::Zero();
   for (const TrackPose& pose : flight.track.poses()) middle_m += pose.position_m;
   middle_m /= static_cast<double>(flight.track.poses().size());
-  std::vector<AnchorByArm> own(flight.anchors.size(), AnchorByArm::Zero());
-  Eigen::Matrix<double, k_shared_size, 2> shared = Eigen::Matrix<double, k_shared_size, 2>::Zero();
-  for (std::size_t i = 0; i < own.size(); ++i) {
+  const std::size_t n_anchors = flight.anchors.size();
+  HeadingResponses responses(k_headings.size(), std::vector<AnchorByArm>(n_anchors, AnchorByArm::Zero()));
+  using SharedByArm = Eigen::Matrix<double, k_shared_size, 2>;
+  std::array<SharedByArm, k_headings.size()> shared;
+  shared.fill(SharedByArm::Zero());
+  for (std::size_t i = 0; i < n_anchors; ++i) {
     const AnchorBlock& block = fit.normal.anchors[i];
     if (!fit.state.anchors[i].active || !(block.scale_m > 0)) continue;
     const JointLines lines(flight.track, flight.anchors[i].rows, fit.state.shared, fit.state.anchors[i]);
@@ -89,29 +95,28 @@ std::vector<AnchorByArm> response_with(Heading heading, const FlightRows& flight
       const JointLine line = lines.line(k);
       const double weight = robust_weight(line.residual_m / block.scale_m, options) /
                             (block.kappa * block.scale_m * block.scale_m);
-      const Eigen::Vector3d forward =
-          direction_at(flight, heading, line.antenna_m, middle_m, row.t_s + fit.state.shared[k_shared_lag]);
       // By the antenna the range changes as by the anchor, with the other sign.
       const Eigen::Vector3d by_antenna = -line.by_anchor.head<3>();
-      const Eigen::RowVector2d by_arm(by_antenna.dot(forward),
-                                      by_antenna.dot(Eigen::Vector3d::UnitZ().cross(forward)));
-      own[i] += weight * line.by_anchor * by_arm;
-      shared += weight * line.by_shared * by_arm;
+      for (std::size_t h = 0; h < k_headings.size(); ++h) {
+        const Eigen::Vector3d forward = direction_at(flight, k_headings[h], line.antenna_m, middle_m,
+                                                     row.t_s + fit.state.shared[k_shared_lag]);
+        const Eigen::RowVector2d by_arm(by_antenna.dot(forward),
+                                        by_antenna.dot(Eigen::Vector3d::UnitZ().cross(forward)));
+        responses[h][i] += weight * line.by_anchor * by_arm;
+        shared[h] += weight * line.by_shared * by_arm;
+      }
     }
-    shared -= block.shared.transpose() * block.own_inverse * own[i];
+    for (std::size_t h = 0; h < k_headings.size(); ++h)
+      shared[h] -= block.shared.transpose() * block.own_inverse * responses[h][i];
   }
-  const Eigen::Matrix<double, k_shared_size, 2> moved =
-      (fit.normal.reduced + prior.information).ldlt().solve(shared);
-  for (std::size_t i = 0; i < own.size(); ++i)
-    own[i] = fit.normal.anchors[i].own_inverse * (own[i] - fit.normal.anchors[i].shared * moved);
-  return own;
-}
-
-/// The same of every anchor for each heading that is asked.
-HeadingResponses responses_without_heading(const FlightRows& flight, const JointFit& fit,
-                                           const SharedPrior& prior, const FlightOptions& options) {
-  return {response_with(Heading::along_course, flight, fit, prior, options),
-          response_with(Heading::to_middle, flight, fit, prior, options)};
+  for (std::size_t h = 0; h < k_headings.size(); ++h) {
+    const SharedByArm moved = (fit.normal.reduced + prior.information).ldlt().solve(shared[h]);
+    for (std::size_t i = 0; i < n_anchors; ++i) {
+      const AnchorBlock& block = fit.normal.anchors[i];
+      responses[h][i] = block.own_inverse * (responses[h][i] - block.shared * moved);
+    }
+  }
+  return responses;
 }
 
 /// The largest error in a direction of the body that the flight would not show.

@@ -135,31 +135,50 @@ TEST(JointLines, MultiplyAsManyColumnsAsThereAre) {
 }
 
 TEST(JointLines, SumToTheNormalEquationsOfTheirDerivatives) {
-  const TagTrack track = lines_track(true);
-  const auto rows = lines_rows(true);
-  const JointLines lines(track, rows, k_lines_shared, k_lines_anchor);
-  std::vector<double> weights;
-  for (std::size_t i = 0; i < lines.size(); ++i)
-    weights.push_back(i % 5 == 0 ? 0.0 : 0.2 + 0.01 * static_cast<double>(i % 7));
-  AnchorBlock block;
-  JointNormal normal;
-  add_lines(lines, weights, 3.0, block, normal);
-  AnchorBlock expected;
-  JointNormal all;
-  for (std::size_t i = 0; i < lines.size(); ++i) {
-    const JointLine line = linearise(track, *lines.rows()[i], k_lines_shared, k_lines_anchor);
-    const double w = 3.0 * weights[i];
-    expected.own += w * line.by_anchor * line.by_anchor.transpose();
-    expected.shared += w * line.by_anchor * line.by_shared.transpose();
-    expected.gradient += w * line.by_anchor * line.residual_m;
-    all.shared += w * line.by_shared * line.by_shared.transpose();
-    all.shared_gradient += w * line.by_shared * line.residual_m;
+  for (const bool attitude : {false, true}) {
+    for (const bool arms : {false, true}) {
+      const TagTrack track = lines_track(attitude);
+      const auto rows = lines_rows(arms);
+      const JointLines lines(track, rows, k_lines_shared, k_lines_anchor);
+      std::vector<double> weights;
+      for (std::size_t i = 0; i < lines.size(); ++i)
+        weights.push_back(i % 5 == 0 ? 0.0 : 0.2 + 0.01 * static_cast<double>(i % 7));
+      AnchorBlock block;
+      JointNormal normal;
+      add_lines(lines, weights, 3.0, block, normal);
+      AnchorBlock expected;
+      JointNormal all;
+      for (std::size_t i = 0; i < lines.size(); ++i) {
+        const JointLine line = linearise(track, *lines.rows()[i], k_lines_shared, k_lines_anchor);
+        const double w = 3.0 * weights[i];
+        expected.own += w * line.by_anchor * line.by_anchor.transpose();
+        expected.shared += w * line.by_anchor * line.by_shared.transpose();
+        expected.gradient += w * line.by_anchor * line.residual_m;
+        all.shared += w * line.by_shared * line.by_shared.transpose();
+        all.shared_gradient += w * line.by_shared * line.residual_m;
+      }
+      EXPECT_LT((block.own - expected.own).norm(), 1e-12 * expected.own.norm());
+      EXPECT_LT((block.shared - expected.shared).norm(), 1e-12 * expected.shared.norm());
+      EXPECT_LT((block.gradient - expected.gradient).norm(), 1e-12 * expected.gradient.norm());
+      EXPECT_LT((normal.shared - all.shared).norm(), 1e-12 * all.shared.norm());
+      EXPECT_LT((normal.shared_gradient - all.shared_gradient).norm(), 1e-12 * all.shared_gradient.norm());
+    }
   }
-  EXPECT_LT((block.own - expected.own).norm(), 1e-12 * expected.own.norm());
-  EXPECT_LT((block.shared - expected.shared).norm(), 1e-12 * expected.shared.norm());
-  EXPECT_LT((block.gradient - expected.gradient).norm(), 1e-12 * expected.gradient.norm());
-  EXPECT_LT((normal.shared - all.shared).norm(), 1e-12 * all.shared.norm());
-  EXPECT_LT((normal.shared_gradient - all.shared_gradient).norm(), 1e-12 * all.shared_gradient.norm());
+}
+
+TEST(JointLines, SayWhatAllRowsHaveInCommon) {
+  const TagTrack turned = lines_track(true), level = lines_track(false);
+  const auto apart = lines_rows(true);
+  auto alike = lines_rows(false);
+  for (JointRow& row : alike) row.antenna = 0;
+  const JointLines one(level, alike, k_lines_shared, k_lines_anchor);
+  EXPECT_TRUE(one.level() && one.one_arm() && one.one_antenna() && one.without_models());
+  for (std::size_t i = 0; i < one.size(); ++i) EXPECT_EQ(one.of(JointLines::stamp)[i], one.rows()[i]->t_s);
+  const JointLines two(turned, apart, k_lines_shared, k_lines_anchor);
+  EXPECT_FALSE(two.level() || two.one_arm() || two.one_antenna());
+  const RangeErrorModel model;
+  alike[200].error_model = &model;
+  EXPECT_FALSE(JointLines(level, alike, k_lines_shared, k_lines_anchor).without_models());
 }
 
 }  // namespace
