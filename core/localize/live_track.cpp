@@ -158,13 +158,19 @@ LiveTrack::Change LiveTrack::insert(Known known, TrackPose pose) {
     change.to_s = std::next(at) == poses_.end() ? t_s : std::next(at)->t_s;
   } else {
     aside_.insert_or_assign(t_s, std::move(pose));
+    count_aside(known, true);
   }
+  ask_those_about(t_s);
   all_.insert(std::ranges::lower_bound(all_, t_s, {}, &Known::t_s), std::move(known));
   if (all_.size() > options_.max_poses) {
-    if (all_.front().in_track)
+    const Known& oldest = all_.front();
+    if (oldest.in_track) {
       poses_.pop_front();
-    else
-      aside_.erase(all_.front().t_s);
+    } else {
+      aside_.erase(oldest.t_s);
+      count_aside(oldest, false);
+    }
+    ask_those_about(oldest.t_s);
     all_.pop_front();
   }
   return change;
@@ -192,7 +198,9 @@ LiveTrack::Change LiveTrack::assess_again() {
   const bool same = std::ranges::all_of(
       good, [&](const Known* known) { return known->in_track == (known->part == segments_.largest()); });
   flight_ = segments_.largest();
-  return same ? Change{} : take(*flight_);
+  if (!same) return take(*flight_);
+  count_all_aside();
+  return {};
 }
 
 /// This part is the flight from here on.
@@ -216,6 +224,7 @@ LiveTrack::Change LiveTrack::take(std::size_t part) {
     else
       aside_.insert_or_assign(known.t_s, std::move(at->second));
   }
+  count_all_aside();
   Change change;
   change.rebuilt = true;
   if (!poses_.empty()) change.newest = poses_.back();
@@ -244,31 +253,88 @@ LiveTrack::Change LiveTrack::settle() {
   return change;
 }
 
+void LiveTrack::ask_again(std::size_t part, Aside& aside) {
+  if (!aside.why) return;
+  asked_[*std::exchange(aside.why, std::nullopt)] -= aside.n;
+  unasked_.insert(part);
+}
+
+void LiveTrack::count_aside(const Known& known, bool more) {
+  if (known.part == k_lesser) return;
+  if (known.part == k_apart) {
+    const auto at = std::ranges::lower_bound(apart_s_, known.t_s);
+    if (more)
+      apart_s_.insert(at, known.t_s);
+    else if (at != apart_s_.end() && *at == known.t_s)
+      apart_s_.erase(at);
+    return;
+  }
+  const auto [aside, is_new] = aside_parts_.try_emplace(known.part);
+  if (is_new) unasked_.insert(known.part);
+  ask_again(known.part, aside->second);
+  if (more)
+    ++aside->second.n;
+  else if (--aside->second.n == 0)
+    aside_parts_.erase(aside);
+}
+
+void LiveTrack::ask_those_about(double t_s) {
+  // Parts are numbered as they began; none reaches beyond the newest of them.
+  if (t_s >= newest_s_) return;
+  for (auto& [part, aside] : aside_parts_) {
+    const auto& told = segments_.segment(part);
+    if (told.first_s > t_s) break;
+    if (told.last_s >= t_s) ask_again(part, aside);
+  }
+}
+
+void LiveTrack::count_all_aside() {
+  apart_s_.clear();
+  aside_parts_.clear();
+  unasked_.clear();
+  asked_.clear();
+  for (const Known& known : all_)
+    if (!known.in_track) count_aside(known, true);
+}
+
+FixRefusal LiveTrack::why_aside(std::size_t part) const {
+  const auto& told = segments_.segment(part);
+  const auto between = std::ranges::upper_bound(all_, told.last_s, {}, &Known::t_s) -
+                       std::ranges::lower_bound(all_, told.first_s, {}, &Known::t_s);
+  return why_apart(told, segments_.segment(*flight_), options_.limits.max_pause_s,
+                   static_cast<std::size_t>(between));
+}
+
 std::map<std::string, std::size_t> LiveTrack::refused() const {
   auto out = counted_;
   if (!flight_) return out;
+  const auto add = [&](FixRefusal why, std::size_t n) {
+    if (n > 0) out[std::string(to_string(why))] += n;
+  };
   const auto& flight = segments_.segment(*flight_);
-  std::map<std::size_t, std::size_t> parts;
-  for (const auto& [t_s, pose] : aside_) {
-    const auto known = std::ranges::lower_bound(all_, t_s, {}, &Known::t_s);
-    if (known == all_.end() || known->t_s != t_s || known->part == k_lesser) continue;
-    if (known->part != k_apart)
-      ++parts[known->part];
-    else if (t_s > flight.last_s + options_.limits.max_pause_s)
-      ++out[std::string(to_string(FixRefusal::future_stamp))];
-    else if (t_s < flight.first_s - options_.limits.max_pause_s)
-      ++out[std::string(to_string(FixRefusal::past_stamp))];
-    else
-      ++out[std::string(to_string(t_s < newest_s_ - options_.limits.max_disorder_s ? FixRefusal::out_of_order
-                                                                                   : FixRefusal::jump))];
+  // Of those of no part the first are too old, the last too new.
+  const auto past = std::ranges::lower_bound(apart_s_, flight.first_s - options_.limits.max_pause_s);
+  const auto future =
+      std::ranges::upper_bound(past, apart_s_.end(), flight.last_s + options_.limits.max_pause_s);
+  const auto late = std::ranges::lower_bound(past, future, newest_s_ - options_.limits.max_disorder_s);
+  add(FixRefusal::past_stamp, static_cast<std::size_t>(past - apart_s_.begin()));
+  add(FixRefusal::out_of_order, static_cast<std::size_t>(late - past));
+  add(FixRefusal::jump, static_cast<std::size_t>(future - late));
+  add(FixRefusal::future_stamp, static_cast<std::size_t>(apart_s_.end() - future));
+  for (const std::size_t part : std::exchange(unasked_, {})) {
+    const auto aside = aside_parts_.find(part);
+    if (aside == aside_parts_.end() || aside->second.why) continue;
+    const FixRefusal why = why_aside(part);
+    if (why == FixRefusal::future_stamp || why == FixRefusal::past_stamp) {
+      // As long as the flight has not come there.
+      add(why, aside->second.n);
+      unasked_.insert(part);
+      continue;
+    }
+    aside->second.why = why;
+    asked_[why] += aside->second.n;
   }
-  for (const auto& [part, n] : parts) {
-    const auto& told = segments_.segment(part);
-    const auto between = std::ranges::upper_bound(all_, told.last_s, {}, &Known::t_s) -
-                         std::ranges::lower_bound(all_, told.first_s, {}, &Known::t_s);
-    out[std::string(to_string(
-        why_apart(told, flight, options_.limits.max_pause_s, static_cast<std::size_t>(between))))] += n;
-  }
+  for (const auto& [why, n] : asked_) add(why, n);
   return out;
 }
 

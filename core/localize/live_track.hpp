@@ -3,7 +3,9 @@
 #include <deque>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
+#include <vector>
 
 #include "core/geo/enu.hpp"
 #include "core/geo/tag_track.hpp"
@@ -43,7 +45,7 @@ class LiveTrack {
   const std::optional<EnuFrame>& frame() const { return frame_; }
   std::optional<UtcTime> epoch() const { return epoch_; }  ///< the instant of t_s = 0
   std::size_t n_used() const { return poses_.size(); }
-  /// Reason -> count, as it stands.
+  /// Reason -> count, as it stands. Looks at what changed since it was asked last.
   std::map<std::string, std::size_t> refused() const;
 
  private:
@@ -57,6 +59,11 @@ class LiveTrack {
     std::size_t part{k_lesser};
     bool in_track{false};
   };
+  /// Positions aside of one part, and why, once that was asked.
+  struct Aside {
+    std::size_t n{};
+    std::optional<FixRefusal> why{};
+  };
 
   Change process(const Fix& fix);
   std::size_t part_of(Known& known);
@@ -65,6 +72,12 @@ class LiveTrack {
   Change take(std::size_t part);
   void choose_frame();
   bool reaches(const Known& known) const;
+  void count_aside(const Known& known, bool more);
+  void ask_again(std::size_t part, Aside& aside);
+  /// A position came or went among those of other parts.
+  void ask_those_about(double t_s);
+  void count_all_aside();
+  FixRefusal why_aside(std::size_t part) const;
   Eigen::Vector3d in_frame(const Eigen::Vector3d& place_m) const;
   double seconds(const Fix& fix) const { return seconds_between(*epoch_, fix.time); }
 
@@ -76,6 +89,11 @@ class LiveTrack {
   std::deque<TrackPose> poses_;
   std::map<double, TrackPose> aside_;  ///< of positions that are not in the track, by time
   std::deque<Known> all_;              ///< ascending in time
+  std::vector<double> apart_s_;        ///< of those aside that are of no part
+  // Those of a part are asked why when somebody wants to know and something about it has changed.
+  mutable std::map<std::size_t, Aside> aside_parts_;
+  mutable std::set<std::size_t> unasked_;
+  mutable std::map<FixRefusal, std::size_t> asked_;  ///< how many, of parts that are not among those
   TrackSegments segments_;
   std::optional<std::size_t> flight_;  ///< the part that is the track
   double newest_s_{0};                 ///< of what segments_ was given

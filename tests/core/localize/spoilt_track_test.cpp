@@ -9,6 +9,7 @@
 #include "core/geo/enu.hpp"
 #include "core/localize/flight_solver.hpp"
 #include "core/localize/live_flight.hpp"
+#include "core/localize/live_track.hpp"
 #include "tests/core/localize/flight_support.hpp"
 #include "tests/core/localize/spoilt_track.hpp"
 
@@ -39,6 +40,22 @@ TEST_P(SpoiltTrack, MovesNoAnchorOfTheSolve) {
     ASSERT_TRUE(got.best) << got.reason;
     EXPECT_EQ(got.verdict, Verdict::ok) << got.reason;
     EXPECT_LT(testing::apart_m(*want.best->wgs84, *got.best->wgs84), 0.01);
+  }
+}
+
+TEST_P(SpoiltTrack, IsCountedTheSameHoweverOftenItIsAsked) {
+  auto flight = make_flight(globe());
+  GetParam().spoil(flight.fixes);
+  for (const std::size_t most : {std::size_t{72'000}, flight.fixes.size() / 3}) {
+    LiveTrack asked(TrackFrame::wgs84, {.max_poses = most});
+    for (std::size_t i = 0; i < flight.fixes.size(); ++i) {
+      asked.add(flight.fixes[i]);
+      const auto counted = asked.refused();
+      if (i % 97 != 0 && i + 1 < flight.fixes.size()) continue;
+      LiveTrack not_asked(TrackFrame::wgs84, {.max_poses = most});
+      for (std::size_t k = 0; k <= i; ++k) not_asked.add(flight.fixes[k]);
+      EXPECT_EQ(counted, not_asked.refused()) << i;
+    }
   }
 }
 
