@@ -275,6 +275,7 @@ void Application::State::add_routes() {
   add_floor_routes(router, place_api);
   add_floor_plan_routes(router, place_api);
   add_bundle_routes(router, bundle_api);
+  add_upload_routes(router, bundle_api);
   add_handover_routes(router, bundle_api);
 }
 

@@ -69,8 +69,8 @@ Error FolderSink::failed() const {
                     "cannot write " + entry_.name + " of the bundle");
 }
 
-Result<std::filesystem::path> make_bundle(BundleApi& api, const Mission& mission, const Principal& who,
-                                          const SpoolFolder& folder) {
+Result<FlightBundle> make_bundle(BundleApi& api, const Mission& mission, const Principal& who,
+                                 const SpoolFolder& folder) {
   BundleManifest manifest{mission.id, mission.name, api.made_by, api.clock.now(), {}};
   FolderSink sink(folder, manifest.entries);
   BOOST_OUTCOME_TRY(api.bundles.write_out(mission.id, sink));
@@ -99,7 +99,9 @@ Result<std::filesystem::path> make_bundle(BundleApi& api, const Mission& mission
     std::error_code gone;
     std::filesystem::remove(folder.path(table.name), gone);
   }
-  return file;
+  Sha256 all;
+  for (const auto& entry : manifest.entries) all.add(entry.name + ' ' + entry.sha256_hex + '\n');
+  return FlightBundle{file, all.hex()};
 }
 
 Result<BundleEntry> entry_of(const std::string& name, const std::filesystem::path& path) {

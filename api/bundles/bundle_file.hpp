@@ -47,9 +47,13 @@ class FolderSink final : public BundleSink {
   std::optional<std::size_t> width_;  ///< columns, known with the first row
 };
 
-/// A bundle in the folder; its path. errors: those of BundleStore::write_out and ZipWriter
-Result<std::filesystem::path> make_bundle(BundleApi& api, const Mission& mission, const Principal& who,
-                                          const SpoolFolder& folder);
+struct FlightBundle {
+  std::filesystem::path file;
+  std::string digest;  ///< of all entries, notes too
+};
+/// A bundle in the folder. errors: those of BundleStore::write_out and ZipWriter
+Result<FlightBundle> make_bundle(BundleApi& api, const Mission& mission, const Principal& who,
+                                 const SpoolFolder& folder);
 
 /// Size and digest of a file under this name. errors: storage_unavailable
 Result<BundleEntry> entry_of(const std::string& name, const std::filesystem::path& path);

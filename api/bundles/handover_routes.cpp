@@ -168,7 +168,7 @@ Response handover(BundleApi& s, const Request& request) {
   const auto file = folder->path("handover.zip");
   auto zip = value_or_problem(ZipWriter::create(file));
   Pack pack(s, request, zip);
-  pack.add_file(std::string(k_pack_bundle), bundle);
+  pack.add_file(std::string(k_pack_bundle), bundle.file);
   if (calibration)
     add_report(s, pack, *calibration, *folder);
   else

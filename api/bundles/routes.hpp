@@ -64,6 +64,8 @@ struct BundleApi {
 /// GET /api/v1/missions/{id}/bundle, GET /api/v1/sites/{id}/bundle, GET /api/v1/missions/{id}/ranges.gpkg
 /// and POST /api/v1/bundles.
 void add_bundle_routes(Router& router, BundleApi& api);
+/// POST /api/v1/bundles/uploads, GET, PATCH and DELETE of one, and POST .../{id}/import.
+void add_upload_routes(Router& router, BundleApi& api);
 /// GET /api/v1/missions/{id}/handover and GET /api/v1/signing-key.
 void add_handover_routes(Router& router, BundleApi& api);
 

@@ -122,7 +122,7 @@ Result<SiteBundle> make_site_bundle(BundleApi& api, const Site& site, const Prin
     BOOST_OUTCOME_TRY(const auto made, make_bundle(api, mission, who, *apart));
     const auto file = folder.path(to_string(mission.id) + std::string(k_flight_ending));
     std::error_code moved;
-    std::filesystem::rename(made, file, moved);
+    std::filesystem::rename(made.file, file, moved);
     if (moved) return make_error(Errc::storage_unavailable, "cannot move a bundle: " + moved.message());
     BOOST_OUTCOME_TRY(auto entry, entry_of(flight_entry(mission.id), file));
     bytes += entry.bytes;

@@ -17,7 +17,7 @@ constexpr int k_undecided = 3;  ///< a person has to decide whose positions hold
 struct Options {
   std::string to, from, token_file, data_dir{"anchord-data"}, url, url_token_file, reason;
   std::vector<std::string> keep, sites;
-  int wait_s{60};
+  int wait_s{60}, timeout_s{30};
   bool dry_run{false}, activate_models{false};
   bool down() const { return !from.empty(); }
 };
@@ -96,6 +96,7 @@ Result<sync::Outcome> run(const Options& options, const sync::Decisions& decisio
                           ": start anchord serve there, or give the field server with --url");
   sync::PeerOptions peer;
   peer.give_up = std::chrono::seconds(options.wait_s);
+  peer.timeout = std::chrono::seconds(options.timeout_s);
   peer.report = [](const std::string& line) { std::fprintf(stderr, "%s\n", printable(line).c_str()); };
   peer.url = *local;
   peer.token_option = "--url-token-file";
@@ -179,6 +180,10 @@ void add_sync_command(CLI::App& app, int& exit_code) {
       ->allow_extra_args(false);
   command->add_option("--wait", options->wait_s, "seconds to wait for a server that does not answer [60]")
       ->check(CLI::Range(1, 86'400));
+  command
+      ->add_option("--timeout", options->timeout_s,
+                   "seconds within which an answer must begin, 20 times as many for one about a bundle [30]")
+      ->check(CLI::Range(1, 3'600));
   command->add_flag("--dry-run", options->dry_run, "show what would be sent or taken, change nothing");
   command->callback([&exit_code, options] { exit_code = sync_command(*options); });
 }

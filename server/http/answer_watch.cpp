@@ -4,12 +4,15 @@
 #include <netinet/in.h>
 #include <sys/socket.h>
 
+#include <algorithm>
+
 namespace anchord::server {
 namespace {
 
 constexpr std::chrono::milliseconds k_look_every{100};
-/// Less than this is no link that a flight's bundle ever gets over: GPRS has five times as much.
-constexpr std::chrono::seconds k_window{30};
+/// Less than this is no link that a flight's bundle ever gets over: GPRS has five times as much. Looked at
+/// after so long, or sooner where the answer must begin sooner.
+constexpr std::chrono::milliseconds k_window{30'000};
 constexpr std::uint64_t k_least_bytes_per_s = 1000;
 /// Beside the body, as it came: heads, sizes of chunks, TLS, and what the kernel holds (tcp_rmem: 6 MiB).
 constexpr std::uint64_t k_most_beside_body = std::uint64_t{24} << 20;
@@ -87,8 +90,10 @@ std::string AnswerWatch::fault(Call& call) const {
   const auto now = Clock::now();
   if (!call.begun)
     return now > call.since + limits_.head ? std::string("did not answer in time") : std::string();
-  if (now < call.since + k_window) return {};
-  const bool slow = call.window_bytes < k_least_bytes_per_s * static_cast<std::uint64_t>(k_window.count());
+  const auto window = std::min(k_window, limits_.head);
+  if (now < call.since + window) return {};
+  const bool slow =
+      call.window_bytes * 1000 < k_least_bytes_per_s * static_cast<std::uint64_t>(window.count());
   call.since = now;
   call.window_bytes = 0;
   return slow ? "answers with less than " + std::to_string(k_least_bytes_per_s) + " bytes a second" : "";

@@ -1,5 +1,8 @@
 #include "server/http/http_client.hpp"
 
+#include <netinet/in.h>
+#include <netinet/tcp.h>
+#include <sys/socket.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -46,6 +49,8 @@ std::string& trusted_file() {
   return file;
 }
 
+/// A link that acknowledges nothing for so long is dead; the system would try for a quarter of an hour.
+constexpr unsigned k_dead_link_ms = 60'000;
 constexpr std::size_t k_sent_bytes = std::size_t{16} << 10;
 
 /// What comes of a call, piece by piece.
@@ -57,7 +62,9 @@ class Exchange {
   void send_with(httplib::Request& out) {
     if (request_.from != nullptr) {
       std::fseek(request_.from, 0, SEEK_END);
-      out.content_length_ = static_cast<std::size_t>(std::max(0L, std::ftell(request_.from)));
+      const auto end = static_cast<std::size_t>(std::max(0L, std::ftell(request_.from)));
+      out.content_length_ = static_cast<std::size_t>(
+          request_.from_bytes.value_or(end - std::min<std::size_t>(end, request_.from_at)));
     } else {
       out.content_length_ = request_.body.size();
     }
@@ -72,9 +79,7 @@ class Exchange {
     out.response_handler = [this](const httplib::Response& answer) {
       if (watch_ != nullptr) watch_->begun();
       take_head(answer);
-      into_ = answer.status == 200 ? request_.into : nullptr;
-      if (into_ != nullptr && (std::fflush(into_) != 0 || ::ftruncate(::fileno(into_), 0) != 0)) failed();
-      if (into_ != nullptr) std::rewind(into_);
+      begin_file();
       bodiless_ = answer.status == 304;  // the library would wait for a body until the end of the connection
       return !bodiless_ && !failure_;
     };
@@ -111,12 +116,28 @@ class Exchange {
   ClientResponse response() && { return std::move(response_); }
 
  private:
+  void begin_file() {
+    const bool part = response_.status == 206 && request_.into_at > 0;
+    into_ = response_.status == 200 || part ? request_.into : nullptr;
+    if (into_ == nullptr) return;
+    if (part &&
+        !response_.headers["content-range"].starts_with("bytes " + std::to_string(request_.into_at) + '-')) {
+      failure_ = make_error(Errc::bad_frame, "the answer is another part than was asked for");
+      return;
+    }
+    const auto at = static_cast<long>(part ? request_.into_at : 0);
+    if (std::fflush(into_) != 0 || ::ftruncate(::fileno(into_), at) != 0 ||
+        std::fseek(into_, at, SEEK_SET) != 0)
+      return failed();
+    if (!request_.begins) return;
+    if (auto begun = request_.begins(response_); !begun) failure_ = begun.error();
+  }
   bool piece(std::size_t at, std::size_t n, httplib::DataSink& sink) {
     if (request_.from == nullptr) {
       (void)sink.write(request_.body.data() + at, n);
     } else {
       char buffer[k_sent_bytes];
-      if (std::fseek(request_.from, static_cast<long>(at), SEEK_SET) != 0 ||
+      if (std::fseek(request_.from, static_cast<long>(request_.from_at + at), SEEK_SET) != 0 ||
           std::fread(buffer, 1, n, request_.from) != n)
         failed();
       if (!failure_) (void)sink.write(buffer, n);
@@ -172,6 +193,7 @@ Result<HttpClient> HttpClient::to(std::string_view url, std::chrono::millisecond
   state->client.set_write_timeout(timeout);
   state->client.set_socket_options([state = state.get()](int socket) {
     httplib::default_socket_options(socket);
+    (void)::setsockopt(socket, IPPROTO_TCP, TCP_USER_TIMEOUT, &k_dead_link_ms, sizeof k_dead_link_ms);
     state->socket = socket;
   });
   return HttpClient(std::move(state));

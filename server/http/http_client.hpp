@@ -3,6 +3,7 @@
 #include <chrono>
 #include <cstdint>
 #include <cstdio>
+#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
@@ -25,8 +26,13 @@ struct ClientRequest {
   std::string_view body{};
   std::string_view content_type{"application/json"};
   std::map<std::string, std::string> headers{};
-  std::FILE* from{nullptr};  ///< all of it is the body
+  std::FILE* from{nullptr};  ///< all of it is the body, or the part below
+  std::uint64_t from_at{0};
+  std::optional<std::uint64_t> from_bytes{};
   std::FILE* into{nullptr};  ///< becomes the body of a 200
+  std::uint64_t into_at{0};  ///< a 206 goes on from here
+  /// With the head of an answer whose body goes there, before its first byte.
+  std::function<Result<void>(const ClientResponse& head)> begins{};
   /// Of the answer, unpacked. With it the answer must also begin within the time-out after the last byte of
   /// the request, and then come with some speed.
   std::optional<std::uint64_t> most_bytes{};

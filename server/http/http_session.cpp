@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <array>
 #include <memory>
 #include <optional>
@@ -272,7 +273,9 @@ class HttpSession final : public Connection, public std::enable_shared_from_this
       pipe->feed({piece.get(), got.produced});
     }
     if (parser.done()) pipe->finish();
-    if (end == BodyEnd::complete && !job && parser.done())
+    // What came of a part that a cut ended is not sent again (upload_routes.cpp).
+    const bool kept = end == BodyEnd::lost && request_->headers.contains("upload-offset");
+    if (!job && ((end == BodyEnd::complete && parser.done()) || kept))
       job = submit(context_->pools.uploads, admission.run, pipe);
     if (!job) {
       if (end == BodyEnd::complete) response = overloaded();
@@ -359,9 +362,12 @@ class HttpSession final : public Connection, public std::enable_shared_from_this
     const bool head_only = request_->method == api::Method::head;
     const bool streamed = static_cast<bool>(response.body_stream);
     if (context_->stopping || (streamed && http_1_0)) keep = false;
-    const auto coding = !streamed  ? BodyCoding::length
-                        : http_1_0 ? BodyCoding::until_close
-                                   : BodyCoding::chunked;
+    // A handler that knows the length of its stream says it itself.
+    const bool sized = std::ranges::any_of(
+        response.headers, [](const auto& header) { return header.first == "Content-Length"; });
+    const auto coding = !streamed           ? BodyCoding::length
+                        : http_1_0 || sized ? BodyCoding::until_close
+                                            : BodyCoding::chunked;
     const std::string head =
         response_head(response, request_->request_id, coding, response.body.size(), keep, http_1_0);
     const bool bodiless = head_only || response.status == 204 || response.status == 304;

@@ -10,6 +10,7 @@
 #include "server/sync/spool.hpp"
 #include "server/sync/sync.hpp"
 #include "server/sync/taken.hpp"
+#include "server/sync/transfer.hpp"
 
 namespace anchord::sync {
 namespace {
@@ -123,14 +124,9 @@ class Flights {
       return boost::outcome_v2::success();
     }
     const auto target = path_of("missions", id, "/bundle");
-    BOOST_OUTCOME_TRY(auto file, Spool::make(run_.options.state_file.parent_path()));
-    BOOST_OUTCOME_TRY(const auto made, run_.source().call({.method = "GET",
-                                                           .target = target,
-                                                           .into = &file,
-                                                           .most_bytes = k_most_bundle_bytes,
-                                                           .bundle = true}));
-    if (made.status != 200) return failed(name, made);
-    BOOST_OUTCOME_TRY(const auto bundle, read_bundle(id, target, std::move(file)));
+    BOOST_OUTCOME_TRY(auto fetched, fetch_bundle(run_, run_.source(), target));
+    if (fetched.answer.status != 200) return failed(name, fetched.answer);
+    BOOST_OUTCOME_TRY(const auto bundle, read_bundle(id, target, std::move(fetched.file)));
     if (taken_.has(id, bundle.own_digest)) {
       // It may have been removed there since, or the centre be another one at the same address.
       BOOST_OUTCOME_TRY(const auto there, run_.target().call({"GET", path_of("missions", id)}));
@@ -147,11 +143,7 @@ class Flights {
       return boost::outcome_v2::success();
     }
     run_.report(name + ": " + size);
-    BOOST_OUTCOME_TRY(const auto answer, run_.target().call({.method = "POST",
-                                                             .target = "/api/v1/bundles",
-                                                             .type = api::k_bundle_type,
-                                                             .from = &bundle.file,
-                                                             .bundle = true}));
+    BOOST_OUTCOME_TRY(const auto answer, send_bundle(run_, bundle.file, api::k_bundle_type));
     if (answer.status == 404 || answer.status == 405)
       return make_error(Errc::unsupported, run_.target().url() + " does not accept flight bundles (" +
                                                sync::in_words(answer) +

@@ -20,9 +20,10 @@ using Json = nlohmann::json;
 using std::chrono::milliseconds;
 using Monotonic = std::chrono::steady_clock;
 
-constexpr milliseconds k_answer_time{30'000};
 /// Five million rows, the most of a bundle, are taken in within some minutes.
-constexpr milliseconds k_bundle_answer_time{600'000};
+constexpr int k_bundle_answer_times = 20;
+/// What a link must bring to count as one: a byte an attempt would go on for years.
+constexpr std::uint64_t k_progress_bytes = std::uint64_t{16} << 10;
 constexpr milliseconds k_first_pause{500}, k_longest_pause{15'000};
 constexpr int k_most_long_attempts = 5;
 constexpr std::size_t k_page = 500;
@@ -33,6 +34,11 @@ Errc errc_of(int status) {
   if (status == 404 || status == 410) return Errc::not_found;
   if (status == 409 || status == 412) return Errc::conflict;
   return Errc::invalid_argument;
+}
+
+double chance_of_pause() {
+  static std::minstd_rand chance{std::random_device{}()};
+  return std::uniform_real_distribution<double>(0, 1)(chance);
 }
 
 bool again_later(int status) { return status == 408 || status == 425 || status == 429 || status >= 500; }
@@ -65,8 +71,8 @@ std::string in_words(const server::ClientResponse& answer) {
 }
 
 Result<std::unique_ptr<Peer>> Peer::to(const PeerOptions& options) {
-  BOOST_OUTCOME_TRY(auto quick, server::HttpClient::to(options.url, k_answer_time));
-  BOOST_OUTCOME_TRY(auto slow, server::HttpClient::to(options.url, k_bundle_answer_time));
+  BOOST_OUTCOME_TRY(auto quick, server::HttpClient::to(options.url, options.timeout));
+  BOOST_OUTCOME_TRY(auto slow, server::HttpClient::to(options.url, options.timeout * k_bundle_answer_times));
   if (!options.token.empty()) {
     quick.set_header("Authorization", "Bearer " + options.token);
     slow.set_header("Authorization", "Bearer " + options.token);
@@ -82,15 +88,42 @@ Result<server::ClientResponse> Peer::once(const PeerRequest& request) {
                                                 .content_type = request.type,
                                                 .headers = request.headers,
                                                 .from = request.from ? request.from->file() : nullptr,
+                                                .from_at = request.from_at,
+                                                .from_bytes = request.from_bytes,
                                                 .into = request.into ? request.into->file() : nullptr,
+                                                .into_at = request.into_at,
+                                                .begins = request.begins,
                                                 .most_bytes = request.most_bytes});
   if (!answer && answer.error().code == Errc::bad_frame)
     return stranger(request.target, answer.error().message);
   return answer;
 }
 
+Result<server::ClientResponse> Peer::go_on(const std::function<Result<server::ClientResponse>()>& attempt,
+                                           const std::function<std::uint64_t()>& arrived) {
+  gateway::Pauses pauses{k_first_pause, k_longest_pause};
+  std::optional<Monotonic::time_point> away_since;
+  for (;;) {
+    const auto before = arrived();
+    auto answer = attempt();
+    if (answer || answer.error().code != Errc::link_lost) return answer;
+    if (arrived() >= before + k_progress_bytes) {
+      pauses.reset();
+      away_since.reset();
+    }
+    const auto now = Monotonic::now();
+    if (!away_since) {
+      away_since = now;
+      options_.report(answer.error().message + "; going on, for " + std::to_string(options_.give_up.count()) +
+                      " s without a link");
+    }
+    const auto wait = pauses.next(chance_of_pause());
+    if (now + wait > *away_since + options_.give_up) return answer;
+    std::this_thread::sleep_for(wait);
+  }
+}
+
 Result<server::ClientResponse> Peer::call(const PeerRequest& request) {
-  static std::minstd_rand chance{std::random_device{}()};
   gateway::Pauses pauses{k_first_pause, k_longest_pause};
   const std::string what = options_.url + " " + std::string(request.method) + " " + request.target + ": ";
   std::optional<Monotonic::time_point> away_since;
@@ -98,8 +131,8 @@ Result<server::ClientResponse> Peer::call(const PeerRequest& request) {
   for (;;) {
     const auto began = Monotonic::now();
     auto answer = once(request);
-    if (!answer && answer.error().code != Errc::link_lost) return answer;
-    auto wait = pauses.next(std::uniform_real_distribution<double>(0, 1)(chance));
+    if (!answer && (request.once || answer.error().code != Errc::link_lost)) return answer;
+    auto wait = pauses.next(chance_of_pause());
     std::string why = answer ? what + in_words(answer.value()) : answer.error().message;
     if (answer) {
       const auto& a = answer.value();

@@ -5,6 +5,7 @@
 #include <map>
 #include <memory>
 #include <nlohmann/json_fwd.hpp>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -21,6 +22,7 @@ struct PeerOptions {
   std::string token_option;          ///< of the command line, for the error text
   std::string role;                  ///< that the token must have, for the same
   std::chrono::seconds give_up{60};  ///< after so long without a useful answer
+  std::chrono::seconds timeout{30};  ///< within which an answer begins; of a bundle 20 times as long
   std::function<void(const std::string& line)> report;
 };
 
@@ -34,10 +36,16 @@ struct PeerRequest {
   std::string_view body{};
   std::string_view type{"application/json"};
   std::map<std::string, std::string> headers{};
-  const Spool* from{nullptr};  ///< all of it is the body
+  const Spool* from{nullptr};  ///< all of it is the body, or the part below
+  std::uint64_t from_at{0};
+  std::optional<std::uint64_t> from_bytes{};
   const Spool* into{nullptr};  ///< becomes the body of a 200
+  std::uint64_t into_at{0};    ///< a 206 goes on from here
+  std::function<Result<void>(const server::ClientResponse& head)>
+      begins{};  ///< before the first byte of that
   std::uint64_t most_bytes{k_most_answer_bytes};
   bool bundle{false};  ///< made or taken in before the answer: minutes instead of seconds
+  bool once{false};    ///< a link that is lost ends the call
 };
 
 /// A server that is spoken to, and may be any: an answer is bounded in length and time. Everything asked of
@@ -52,6 +60,10 @@ class Peer {
   /// Any answer that is not "again later". errors: link_lost (gave up), storage_full (507, or the disk here),
   /// invalid_argument (401, 403, an answer that is too long)
   Result<server::ClientResponse> call(const PeerRequest& request);
+  /// Attempts one after the other, each until its link is lost, as long as `arrived` bytes grow or the link
+  /// is back in time. errors: as call
+  Result<server::ClientResponse> go_on(const std::function<Result<server::ClientResponse>()>& attempt,
+                                       const std::function<std::uint64_t()>& arrived);
   /// Body of the 2xx as a JSON object. errors: as call; not_found, conflict and invalid_argument of the
   /// answer
   Result<nlohmann::json> get(const std::string& target);

@@ -7,6 +7,7 @@
 #include "server/sync/spool.hpp"
 #include "server/sync/sync.hpp"
 #include "server/sync/taken.hpp"
+#include "server/sync/transfer.hpp"
 
 namespace anchord::sync {
 namespace {
@@ -59,21 +60,9 @@ class Sites {
 
   /// What the field has of it, as a digest; empty: nothing.
   Result<std::string> at_field(const std::string& id) {
-    BOOST_OUTCOME_TRY(const auto file, spool());
-    BOOST_OUTCOME_TRY(const auto made, fetch(run_.field, id, file, {}));
-    if (made.status != 200) return std::string();
-    return digest_of(run_.field, id, file);
-  }
-  Result<Spool> spool() const { return Spool::make(run_.options.state_file.parent_path()); }
-  static Result<server::ClientResponse> fetch(Peer& peer, const std::string& id, const Spool& file,
-                                              const std::string& known) {
-    PeerRequest request{.method = "GET",
-                        .target = bundle_path(id),
-                        .into = &file,
-                        .most_bytes = k_most_bundle_bytes,
-                        .bundle = true};
-    if (!known.empty()) request.headers.emplace("If-None-Match", "\"sha256:" + known + '"');
-    return peer.call(request);
+    BOOST_OUTCOME_TRY(const auto fetched, fetch_bundle(run_, run_.field, bundle_path(id)));
+    if (fetched.answer.status != 200) return std::string();
+    return digest_of(run_.field, id, fetched.file);
   }
 
   /// It may have been removed there since, or the centre be another one at the same address.
@@ -92,8 +81,8 @@ class Sites {
         return boost::outcome_v2::success();
       }
     }
-    BOOST_OUTCOME_TRY(const auto file, spool());
-    BOOST_OUTCOME_TRY(const auto made, fetch(run_.source(), id, file, known));
+    BOOST_OUTCOME_TRY(const auto fetched, fetch_bundle(run_, run_.source(), bundle_path(id), known));
+    const auto& [made, file] = fetched;
     if (made.status == 304) return there(id, known);
     if (!run_.up() && (made.status == 404 || made.status == 405 || made.status == 422))
       return make_error(Errc::unsupported, run_.centre.url() + " does not give bundles of sites (" +
@@ -108,11 +97,7 @@ class Sites {
       return boost::outcome_v2::success();
     }
     run_.report(what + ": " + megabytes(file.bytes()));
-    BOOST_OUTCOME_TRY(const auto answer, run_.target().call({.method = "POST",
-                                                             .target = "/api/v1/bundles",
-                                                             .type = api::k_site_bundle_type,
-                                                             .from = &file,
-                                                             .bundle = true}));
+    BOOST_OUTCOME_TRY(const auto answer, send_bundle(run_, file, api::k_site_bundle_type));
     if (answer.status != 200 && answer.status != 201) return failed(what, answer);
     return arrived(id, what, digest, json_of(answer));
   }

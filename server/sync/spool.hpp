@@ -16,6 +16,10 @@ class Spool {
   /// On the disk of this folder; where that cannot be, in /tmp. errors: storage_full, storage_unavailable
   static Result<Spool> make(const std::filesystem::path& folder);
 
+  /// The file of this name, as it is, that no other process has: what is killed here leaves it for the next
+  /// run. errors: conflict (another has it), storage_full, storage_unavailable
+  static Result<Spool> named(const std::filesystem::path& file);
+
   std::FILE* file() const { return file_.get(); }
   /// For who opens it by name.
   std::string path() const;
@@ -28,6 +32,9 @@ class Spool {
   explicit Spool(std::FILE* file) : file_(file) {}
   std::unique_ptr<std::FILE, Close> file_;
 };
+
+/// SHA-256 of all of it, in hex. errors: storage_unavailable
+Result<std::string> digest_of(const Spool& file);
 
 std::string megabytes(std::uint64_t bytes);
 

@@ -6,6 +6,7 @@
 #include <string_view>
 
 #include "server/sync/peer.hpp"
+#include "server/sync/transfer.hpp"
 
 namespace anchord::sync {
 namespace {
@@ -122,6 +123,7 @@ Result<Outcome> sync(Peer& field, Peer& centre, const SyncOptions& options) {
   if (!run.whole_servers)
     run.report(
         "a token is bound to sites: models and profiles of kits do not go, which are of the whole server");
+  remove_old_parts(run);
   BOOST_OUTCOME_TRYV(run.up() ? up(run) : down(run));
   return std::move(run.outcome);
 }

@@ -71,6 +71,7 @@ struct Run {
   const SyncOptions& options;
   Outcome outcome{};
   std::vector<Site> sites{};  ///< down: those that were chosen
+  bool in_parts{true};        ///< the centre takes bundles in parts, as far as is known
   bool whole_servers{true};   ///< neither token is bound to sites: models and profiles go too
 
   bool up() const { return options.direction == Direction::up; }

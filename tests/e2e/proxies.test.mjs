@@ -143,6 +143,17 @@ async function everything(url, curl, port) {
   await curl(...bearer, ...json, '-d', '{"action":"finish"}', `${url}/api/v1/missions/${id}/actions`);
   await eventually('the event of its end', () => text.includes(id));
   socket.close();
+
+  const address = `${url}/api/v1/missions/${id}/bundle`;
+  await curl(...bearer, '-o', at('whole'), address);
+  const whole = readFileSync(at('whole'));
+  await curl(...bearer, '-r', '0-699', '-o', at('part'), address);
+  assert.equal(readFileSync(at('part')).length, 700);
+  const rest = await curl(...bearer, '--continue-at', '-', '-o', at('part'), '-w', '%{http_code}', address);
+  assert.deepEqual([rest.code, rest.stdout], [0, '206'], rest.stderr);
+  assert.ok(readFileSync(at('part')).equals(whole), 'the same bytes as without a cut');
+  const beyond = await curl(...bearer, '-r', `${whole.length}-`, '-D', '-', '-o', at('part'), address);
+  assert.match(beyond.stdout, new RegExp(`^HTTP/\\S+ 416[^]*content-range: bytes \\*/${whole.length}\r\n`, 'i'));
 }
 
 test('nginx with the sample of the documentation', async () => {
