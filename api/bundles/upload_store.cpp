@@ -1,8 +1,5 @@
 #include "api/bundles/upload_store.hpp"
 
-#include <fcntl.h>
-#include <unistd.h>
-
 #include <algorithm>
 #include <cerrno>
 #include <chrono>
@@ -44,30 +41,6 @@ Error cannot_add(int why) {
   return make_error(why == ENOSPC || why == EDQUOT ? Errc::storage_full : Errc::storage_unavailable,
                     std::string("cannot write a part of a bundle: ") + std::strerror(why));
 }
-
-/// A file that is written where it says.
-class PartFile {
- public:
-  explicit PartFile(const fs::path& path) : fd_(::open(path.c_str(), O_WRONLY | O_CLOEXEC)) {}
-  ~PartFile() {
-    if (fd_ >= 0) ::close(fd_);
-  }
-  PartFile(const PartFile&) = delete;
-  PartFile& operator=(const PartFile&) = delete;
-  bool write(std::uint64_t at, std::string_view bytes) const {
-    while (!bytes.empty()) {
-      const auto n = ::pwrite(fd_, bytes.data(), bytes.size(), static_cast<off_t>(at));
-      if (n <= 0) return false;
-      at += static_cast<std::uint64_t>(n);
-      bytes.remove_prefix(static_cast<std::size_t>(n));
-    }
-    return true;
-  }
-  bool is_open() const { return fd_ >= 0; }
-
- private:
-  const int fd_;
-};
 
 /// Oldest first.
 void sort_by_age(std::vector<Upload>& uploads) { std::ranges::sort(uploads, {}, &Upload::expires); }
@@ -154,8 +127,9 @@ Result<Upload> UploadStore::find(const std::string& token_id, std::string_view i
 }
 
 Result<std::uint64_t> UploadStore::add(const Upload& upload, const Request& request) const {
-  const PartFile file(upload.file);
-  if (!file.is_open()) return cannot_add(errno);
+  errno = 0;
+  std::fstream file(upload.file, std::ios::in | std::ios::out | std::ios::binary);
+  if (!file || !file.seekp(static_cast<std::streamoff>(upload.offset))) return cannot_add(errno);
   std::uint64_t at = upload.offset;
   std::vector<char> piece(k_taken_bytes);
   for (std::size_t n; (n = request.body_stream->read(piece)) > 0; at += n) {
@@ -164,7 +138,7 @@ Result<std::uint64_t> UploadStore::add(const Upload& upload, const Request& requ
                                                     std::to_string(upload.bytes - upload.offset) +
                                                     " bytes that are missing");
     errno = 0;
-    if (!file.write(at, {piece.data(), n})) return cannot_add(errno);
+    if (!file.write(piece.data(), static_cast<std::streamsize>(n)) || !file.flush()) return cannot_add(errno);
   }
   return at;
 }
