@@ -9,6 +9,7 @@ import { fileURLToPath } from 'node:url';
 import { simulatedFlight } from '../e2e/flight.mjs';
 import { root, Server } from '../e2e/server.mjs';
 import { Disk } from './disk.mjs';
+import { generator } from './random.mjs';
 import { Deleter, Gateway, Installer, Promoter, Publisher } from './work.mjs';
 
 const k_args = ['--rate-per-s', '100000', '--rate-burst', '100000', '--backup-schedule', 'off'];
@@ -21,17 +22,6 @@ const query = (file) => (sql) =>
   JSON.parse(
     execFileSync('sqlite3', ['-readonly', '-json', file, sql], { encoding: 'utf8', maxBuffer: 1 << 28 }) || '[]',
   );
-
-/** Repeatable, for one order of calls: mulberry32. */
-function generator(seed) {
-  let a = seed >>> 0;
-  return () => {
-    a = (a + 0x6d2b79f5) | 0;
-    let t = Math.imul(a ^ (a >>> 15), 1 | a);
-    t = (t + Math.imul(t ^ (t >>> 7), 61 | t)) ^ t;
-    return ((t ^ (t >>> 14)) >>> 0) / 2 ** 32;
-  };
-}
 
 class Torture {
   constructor({ seed, shim, print }) {
