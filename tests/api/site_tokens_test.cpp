@@ -127,6 +127,7 @@ TEST_F(SiteTokenRoutes, WhatIsOfItsOwnSiteIsThere) {
                                        "/api/v1/missions/{id}/plan",
                                        "/api/v1/missions/{id}/plan/change",
                                        "/api/v1/ranges/{id}/cir",
+                                       "/api/v1/bundles/uploads/{id}",
                                        "/api/v1/floors/{id}/plan",
                                        "/api/v1/floors/{id}/plan/preview",
                                        "/api/v1/floors/{id}/plan/backdrop",

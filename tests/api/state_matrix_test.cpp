@@ -144,23 +144,24 @@ TEST_F(StateMatrix, OfPlansDevicesAndSitesHoldsToo) {
 // what is in use.
 TEST_F(StateMatrix, EveryRouteThatDeletesIsKnown) {
   const std::set<std::string> known{
-      "/api/v1/missions/{id}",       // recording, flying, calibrated: 409
-      "/api/v1/devices/{id}",        // enabled while a mission records: 409
-      "/api/v1/plans/{id}",          // being flown: 409
-      "/api/v1/sites/{id}",          // with missions, anchors or frames: 409
-      "/api/v1/frames/{id}",         // If-Match; positions are stored on the globe
-      "/api/v1/calibrations/{id}",   // published: 409
-      "/api/v1/campaigns/{id}",      // of a training that waits or runs: 409
-      "/api/v1/datasets/{id}",       // with training runs: 409
-      "/api/v1/training-runs/{id}",  // waiting or running: 422
-      "/api/v1/models/{id}",         // ever promoted: 409
-      "/api/v1/jobs/{id}",           // cancels; ended: 422
-      "/api/v1/tokens/{id}",         // revokes: it stays in the list
-      "/api/v1/webhooks/{id}",       // If-Match; what was not delivered goes with it
-      "/api/v1/session",             // ends the caller's own
-      "/api/v1/buildings/{id}",      // with floors: 409
-      "/api/v1/floors/{id}",         // If-Match; its plan and walls go with it
-      "/api/v1/floors/{id}/plan",    // If-Match; the walls that were accepted stay
+      "/api/v1/missions/{id}",         // recording, flying, calibrated: 409
+      "/api/v1/devices/{id}",          // enabled while a mission records: 409
+      "/api/v1/plans/{id}",            // being flown: 409
+      "/api/v1/sites/{id}",            // with missions, anchors or frames: 409
+      "/api/v1/frames/{id}",           // If-Match; positions are stored on the globe
+      "/api/v1/calibrations/{id}",     // published: 409
+      "/api/v1/campaigns/{id}",        // of a training that waits or runs: 409
+      "/api/v1/datasets/{id}",         // with training runs: 409
+      "/api/v1/training-runs/{id}",    // waiting or running: 422
+      "/api/v1/models/{id}",           // ever promoted: 409
+      "/api/v1/jobs/{id}",             // cancels; ended: 422
+      "/api/v1/tokens/{id}",           // revokes: it stays in the list
+      "/api/v1/webhooks/{id}",         // If-Match; what was not delivered goes with it
+      "/api/v1/bundles/uploads/{id}",  // the caller's own; nothing of it is imported yet
+      "/api/v1/session",               // ends the caller's own
+      "/api/v1/buildings/{id}",        // with floors: 409
+      "/api/v1/floors/{id}",           // If-Match; its plan and walls go with it
+      "/api/v1/floors/{id}/plan",      // If-Match; the walls that were accepted stay
   };
   for (const auto& route : app_->router().routes()) {
     if (route.method == Method::del) {

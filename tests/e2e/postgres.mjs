@@ -93,9 +93,14 @@ export class Postgres {
 
   /** To it and every session. SIGSTOP: connections stay and nothing is answered, until SIGCONT. */
   signalAll(signal) {
-    const { pid } = this.child,
-      sessions = readFileSync(`/proc/${pid}/task/${pid}/children`, 'utf8').trim().split(/\s+/);
-    for (const one of [pid, ...sessions.map(Number)]) process.kill(one, signal);
+    const { pid } = this.child;
+    process.kill(pid, signal); // first: one that is stopped begins no session
+    for (const one of readFileSync(`/proc/${pid}/task/${pid}/children`, 'utf8').trim().split(/\s+/))
+      try {
+        process.kill(Number(one), signal);
+      } catch (error) {
+        if (error.code !== 'ESRCH') throw error; // it ended meanwhile
+      }
   }
 
   /** What one statement prints, columns apart by a bar. */

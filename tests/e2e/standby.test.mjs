@@ -234,8 +234,8 @@ test('one whose database answers nothing ends although a write of it is under wa
     renewed = () => postgres.psql("SELECT lease_t_ns FROM server_lease WHERE standby <> ''", 'anchord');
   const before_it = await eventually('another one is seen to stand by', renewed);
   await eventually('the holder has seen it too', async () => (await renewed()) !== before_it);
-  postgres.signalAll('SIGSTOP');
   try {
+    postgres.signalAll('SIGSTOP');
     assert.equal(await sent(mission, 1, 1), false);
     await eventually('it ends', () => ended.child.exitCode !== null, 60_000, 100);
   } finally {
