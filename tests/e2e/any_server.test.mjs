@@ -20,7 +20,7 @@ async function start(name, { port, secure }) {
     auth: 'on',
     args: [
       ...['--standby', '--standby-url', secure ? `https://127.0.0.1:${secure}` : `http://127.0.0.1:${port}`],
-      ...['--database', postgres.url(name), '--trusted-proxies', '127.0.0.1', '--allowed-hosts', 'localhost'],
+      ...['--database', postgres.url(name), '--trusted-proxies', '127.0.0.1', '--allowed-hosts', 'anchord.example'],
     ],
     env: postgres.env,
     tls: secure ? { certificate: at('server.pem'), key: at('server.key') } : undefined,
@@ -39,7 +39,7 @@ async function start(name, { port, secure }) {
 const there = (server) => eventually('it has the database', () => /listening/.test(server.log), 30_000);
 
 before(async () => {
-  const made = await run(['tls', 'init', '--dir', folder, '--name', 'localhost']);
+  const made = await run(['tls', 'init', '--dir', folder, '--name', 'anchord.example']);
   assert.equal(made.code, 0, made.stderr);
   postgres = await startPostgres();
   for (const name of ['plain', 'sealed']) await postgres.psql(`CREATE DATABASE ${name}`);
@@ -173,7 +173,10 @@ test('HTTPS goes through sealed, to the certificate of the one that has the data
   const one = await start('sealed', { port: await free_tcp_port(), secure: await free_tcp_port() });
   const two = await start('sealed', { port: await free_tcp_port(), secure: await free_tcp_port() });
   try {
-    const asked = await curl('--cacert', at('ca.pem'), `https://localhost:${two.securePort}/api/v1/missions`);
+    const asked = await curl(
+      ...['--cacert', at('ca.pem'), '--resolve', `anchord.example:${two.securePort}:127.0.0.1`],
+      `https://anchord.example:${two.securePort}/api/v1/missions`,
+    );
     assert.equal(asked.code, 0, asked.stderr);
     assert.match(asked.stdout, /"items":\[\]/);
     const closed = await curl(`http://127.0.0.1:${two.port}/readyz`);
