@@ -3,25 +3,13 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstring>
 
-// Vectors pass between functions here, all of which are inlined; nobody else sees how.
-#pragma GCC diagnostic ignored "-Wpsabi"
+#include "core/localize/lanes.hpp"
 
 namespace anchord {
 namespace {
 
-constexpr std::size_t k_lanes = 4;
-/// Four doubles and the arithmetic of one: two SSE2 registers or one of AVX2, the same operations in either.
-using Four = double __attribute__((vector_size(k_lanes * sizeof(double))));
-#define ANCHORD_FACTOR_INLINE inline __attribute__((always_inline))
-
-ANCHORD_FACTOR_INLINE Four load(const double* from) {
-  Four out;
-  std::memcpy(&out, from, sizeof out);
-  return out;
-}
-ANCHORD_FACTOR_INLINE void store(double* to, Four value) { std::memcpy(to, &value, sizeof value); }
+using namespace lanes;
 
 struct Columns {
   double* begin;
@@ -30,7 +18,7 @@ struct Columns {
 
 /// Takes the columns before `j` off `groups` groups of its rows, which stay in registers.
 template <std::size_t groups>
-ANCHORD_FACTOR_INLINE void reduce(const Columns& columns, std::size_t j, std::size_t row) {
+ANCHORD_INLINE void reduce(const Columns& columns, std::size_t j, std::size_t row) {
   double* const to = columns.begin + j * columns.length + row;
   std::array<Four, groups> left;
   for (std::size_t g = 0; g < groups; ++g) left[g] = load(to + g * k_lanes);
@@ -41,7 +29,7 @@ ANCHORD_FACTOR_INLINE void reduce(const Columns& columns, std::size_t j, std::si
   for (std::size_t g = 0; g < groups; ++g) store(to + g * k_lanes, left[g]);
 }
 
-ANCHORD_FACTOR_INLINE void factor_columns(const Columns& columns) {
+ANCHORD_INLINE void factor_columns(const Columns& columns) {
   constexpr std::size_t k_many = 4;
   for (std::size_t j = 0; j < columns.n; ++j) {
     const std::size_t first = j / k_lanes * k_lanes;

@@ -2,32 +2,15 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <limits>
 #include <utility>
 
-// Vectors pass between functions here, all of which are inlined; nobody else sees how.
-#pragma GCC diagnostic ignored "-Wpsabi"
+#include "core/localize/lanes.hpp"
 
 namespace anchord {
 namespace {
 
-constexpr std::size_t k_lanes = 4;
-/// Four doubles and the arithmetic of one: two SSE2 registers or one of AVX2, the same operations in either.
-using Four = double __attribute__((vector_size(k_lanes * sizeof(double))));
-#define ANCHORD_LINES_INLINE inline __attribute__((always_inline))
-
-ANCHORD_LINES_INLINE Four load(const double* from) {
-  Four out;
-  std::memcpy(&out, from, sizeof out);
-  return out;
-}
-ANCHORD_LINES_INLINE void store(double* to, Four value) { std::memcpy(to, &value, sizeof value); }
-ANCHORD_LINES_INLINE Four root(Four a) {
-  Four out;
-  for (std::size_t i = 0; i < k_lanes; ++i) out[i] = __builtin_sqrt(a[i]);
-  return out;
-}
+using namespace lanes;
 
 /// One row, and where in the track it is.
 struct Placed {
@@ -49,7 +32,7 @@ struct Places {
   bool level{true};  ///< all of them: no attitude is known, and no axes are set
 
   /// turned: all rows have attitude
-  ANCHORD_LINES_INLINE void add(const Placed& placed, bool turned) {
+  ANCHORD_INLINE void add(const Placed& placed, bool turned) {
     const TrackPose &before = *placed.in.before, &later = *placed.in.later;
     const JointRow& row = *placed.row;
     distance_m[n] = row.distance_m;
@@ -87,7 +70,7 @@ struct Places {
     ++n;
   }
   /// Axes of the body and its arm, of rows that all have attitude: what interpolate() does with each.
-  ANCHORD_LINES_INLINE void turn_all() {
+  ANCHORD_INLINE void turn_all() {
     level = false;
     const Four one = Four{} + 1.0, none{};
     for (std::size_t i = 0; i < n; i += k_lanes) {
@@ -136,13 +119,13 @@ struct Places {
 
  private:
   using Three = std::array<Four, 3>;
-  static ANCHORD_LINES_INLINE Three cross(const Three& a, const Three& b) {
+  static ANCHORD_INLINE Three cross(const Three& a, const Three& b) {
     return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
   }
   /// Four quaternions, which turn four vectors as Eigen's do.
   struct Turned {
     Four x, y, z, w;
-    ANCHORD_LINES_INLINE Three turn(const Three& v) const {
+    ANCHORD_INLINE Three turn(const Three& v) const {
       const Three axis{x, y, z};
       Three twice = cross(axis, v);
       for (Four& one : twice) one += one;
@@ -150,8 +133,8 @@ struct Places {
       return {v[0] + w * twice[0] + more[0], v[1] + w * twice[1] + more[1], v[2] + w * twice[2] + more[2]};
     }
   };
-  ANCHORD_LINES_INLINE void keep_attitudes(const TrackPose& before, const TrackPose& later,
-                                           const JointRow& row, double share, double interval_s) {
+  ANCHORD_INLINE void keep_attitudes(const TrackPose& before, const TrackPose& later, const JointRow& row,
+                                     double share, double interval_s) {
     const double *const b = before.attitude->coeffs().data(), *const q = later.attitude->coeffs().data();
     const double *const p = before.position_m.data(), *const p_later = later.position_m.data();
     px_m[n] = p[0];
@@ -219,7 +202,7 @@ struct Columns {
 };
 
 /// Lines of sight and distances first, then what follows from the curve at them.
-ANCHORD_LINES_INLINE void aim(const At& at, Places& p, Numbers& far_m, const Columns& out) {
+ANCHORD_INLINE void aim(const At& at, Places& p, Numbers& far_m, const Columns& out) {
   for (std::size_t i = 0; i < p.n; i += k_lanes) {
     const Four up_m = load(&p.up_m[i]);
     Four x = load(&p.x_m[i]), y = load(&p.y_m[i]), z = load(&p.z_m[i]);
@@ -245,8 +228,8 @@ ANCHORD_LINES_INLINE void aim(const At& at, Places& p, Numbers& far_m, const Col
     store(&far_m[i], distance);
   }
 }
-ANCHORD_LINES_INLINE void derive(const At& at, const Places& p, const Numbers& far_m, const Numbers& curve,
-                                 const Numbers& slope, const Columns& out) {
+ANCHORD_INLINE void derive(const At& at, const Places& p, const Numbers& far_m, const Numbers& curve,
+                           const Numbers& slope, const Columns& out) {
   const Four nothing{};
   for (std::size_t i = 0; i < p.n; i += k_lanes) {
     const Four x = load(&p.x_m[i]), y = load(&p.y_m[i]), z = load(&p.z_m[i]), s = load(&slope[i]);
@@ -280,8 +263,8 @@ struct Products {
 constexpr std::size_t k_most_sums = 10;
 /// One column by `many`.
 template <std::size_t many>
-ANCHORD_LINES_INLINE void multiply_by(const double* column, const double* const* columns, const Products& p,
-                                      double* out) {
+ANCHORD_INLINE void multiply_by(const double* column, const double* const* columns, const Products& p,
+                                double* out) {
   std::array<Four, many> sums{};
   for (std::size_t i = 0; i < p.padded; i += k_lanes) {
     const Four weighed = load(p.weights + i) * load(column + i);
@@ -290,11 +273,11 @@ ANCHORD_LINES_INLINE void multiply_by(const double* column, const double* const*
   for (std::size_t j = 0; j < many; ++j) out[j] = (sums[j][0] + sums[j][1]) + (sums[j][2] + sums[j][3]);
 }
 template <std::size_t... many>
-ANCHORD_LINES_INLINE void multiply_by_first(std::size_t n, const double* column, const double* const* columns,
-                                            const Products& p, double* out, std::index_sequence<many...>) {
+ANCHORD_INLINE void multiply_by_first(std::size_t n, const double* column, const double* const* columns,
+                                      const Products& p, double* out, std::index_sequence<many...>) {
   (void)((n == many + 1 && (multiply_by<many + 1>(column, columns, p, out), true)) || ...);
 }
-ANCHORD_LINES_INLINE void multiply(const Products& p) {
+ANCHORD_INLINE void multiply(const Products& p) {
   double* out = p.out;
   for (std::size_t i = 0; i < p.columns.size(); ++i)
     for (std::size_t j = i; j < p.columns.size(); j += k_most_sums) {
@@ -303,8 +286,8 @@ ANCHORD_LINES_INLINE void multiply(const Products& p) {
       out += n;
     }
 }
-ANCHORD_LINES_INLINE void weigh(const JointLines& lines, double variance_m2, double usual_m2, double cut_off,
-                                double* to) {
+ANCHORD_INLINE void weigh(const JointLines& lines, double variance_m2, double usual_m2, double cut_off,
+                          double* to) {
   const double inverse_cut = 1.0 / (cut_off * cut_off);
   const Four nothing{};
   for (std::size_t i = 0; i < lines.padded(); i += k_lanes) {
@@ -317,7 +300,7 @@ ANCHORD_LINES_INLINE void weigh(const JointLines& lines, double variance_m2, dou
   }
 }
 
-ANCHORD_LINES_INLINE void place(std::span<const Placed> placed, Places& to) {
+ANCHORD_INLINE void place(std::span<const Placed> placed, Places& to) {
   const bool turned = !placed.empty() && std::ranges::all_of(placed, [](const Placed& one) {
     return one.in.before->attitude && one.in.later->attitude;
   });

@@ -3,32 +3,16 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstring>
 #include <utility>
 
-// Vectors pass between functions here, all of which are inlined; nobody else sees how.
-#pragma GCC diagnostic ignored "-Wpsabi"
+#include "core/localize/lanes.hpp"
 
 namespace anchord {
 namespace {
 
-constexpr std::size_t k_lanes = 4;
-/// Four doubles and the arithmetic of one: two SSE2 registers or one of AVX2, the same operations in either.
-using Four = double __attribute__((vector_size(k_lanes * sizeof(double))));
-#define ANCHORD_INLINE inline __attribute__((always_inline))
+using namespace lanes;
 
 ANCHORD_INLINE Four four(double value) { return Four{value, value, value, value}; }
-ANCHORD_INLINE Four load(const double* from) {
-  Four out;
-  std::memcpy(&out, from, sizeof out);
-  return out;
-}
-ANCHORD_INLINE void store(double* to, Four value) { std::memcpy(to, &value, sizeof value); }
-ANCHORD_INLINE Four root(Four a) {
-  Four out;
-  for (std::size_t i = 0; i < k_lanes; ++i) out[i] = __builtin_sqrt(a[i]);
-  return out;
-}
 double sum(const Four& a) { return (a[0] + a[1]) + (a[2] + a[3]); }
 
 /// Sums over the rows, a lane each. `w` is the robust weight times the information, `c` the slope of psi
