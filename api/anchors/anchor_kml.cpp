@@ -8,7 +8,7 @@
 namespace anchord::api {
 namespace {
 
-std::string number(double value, int decimals) {
+std::string kml_number(double value, int decimals) {
   char text[64];
   std::snprintf(text, sizeof text, "%.*f", decimals, value);
   return text;
@@ -33,14 +33,14 @@ std::string placemark(const AnchorFeature& feature) {
   }
   out += "<ExtendedData>" + data("network_id", id) + data("status", feature.status) +
          data("revision", feature.revision ? std::to_string(*feature.revision) : "") +
-         data("h_ellipsoidal_m", number(at.height_m, 4)) + data("h95_m", number(place.h95_m, 4)) +
-         data("v95_m", number(place.v95_m, 4)) + data("verdict", k_verdict_words.word(estimate.verdict)) +
+         data("h_ellipsoidal_m", kml_number(at.height_m, 4)) + data("h95_m", kml_number(place.h95_m, 4)) +
+         data("v95_m", kml_number(place.v95_m, 4)) + data("verdict", k_verdict_words.word(estimate.verdict)) +
          data("gates_failed", failed) +
          data("override_reason", feature.overridden ? feature.overridden->reason : "") +
          data("frame", feature.site ? feature.site->crs_frame : "") + "</ExtendedData>";
   out += std::string("<Point><altitudeMode>") + (sea_level ? "absolute" : "clampToGround") +
-         "</altitudeMode><coordinates>" + number(at.lon_deg, 9) + ',' + number(at.lat_deg, 9);
-  if (sea_level) out += ',' + number(*feature.height_orthometric_m, 4);
+         "</altitudeMode><coordinates>" + kml_number(at.lon_deg, 9) + ',' + kml_number(at.lat_deg, 9);
+  if (sea_level) out += ',' + kml_number(*feature.height_orthometric_m, 4);
   return out + "</coordinates></Point></Placemark>\n";
 }
 

@@ -13,7 +13,7 @@ using Ordered = nlohmann::ordered_json;
 
 namespace {
 
-Ordered vector_json(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
+Ordered offset_json(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
 Eigen::Vector3d vector_of(const Json& json) {
   return {json.at(0).get<double>(), json.at(1).get<double>(), json.at(2).get<double>()};
 }
@@ -57,9 +57,9 @@ Ordered frame_fit_json(const FrameFit& fit, const std::vector<FramePair>& pairs)
               {"scale", t.scale},
               {"yaw_deg", t.yaw_deg()},
               {"tilt_deg", t.tilt_deg()},
-              {"shift_m", vector_json(t.shift_m)},
+              {"shift_m", offset_json(t.shift_m)},
               {"enu_from_local", matrix_json(t.enu_from_local)},
-              {"centroid_local_m", vector_json(fit.centroid_local_m)},
+              {"centroid_local_m", offset_json(fit.centroid_local_m)},
               {"rms_m", fit.rms_m},
               {"dof", fit.dof}};
   out["covariance"] = nullptr;
@@ -78,8 +78,8 @@ Ordered frame_fit_json(const FrameFit& fit, const std::vector<FramePair>& pairs)
   for (std::size_t i = 0; i < fit.residuals.size() && i < pairs.size(); ++i) {
     const auto& r = fit.residuals[i];
     residuals.push_back({{"name", pairs[i].name},
-                         {"residual_m", vector_json(r.residual_m)},
-                         {"left_out_m", r.left_out_m ? vector_json(*r.left_out_m) : Ordered(nullptr)}});
+                         {"residual_m", offset_json(r.residual_m)},
+                         {"left_out_m", r.left_out_m ? offset_json(*r.left_out_m) : Ordered(nullptr)}});
   }
   out["residuals"] = std::move(residuals);
   out["notes"] = fit.notes;
@@ -90,8 +90,8 @@ std::string frame_definition_json(const FrameDefinition& definition) {
   Ordered pairs = Ordered::array();
   for (const auto& pair : definition.pairs)
     pairs.push_back({{"name", pair.name},
-                     {"local_m", vector_json(pair.local_m)},
-                     {"enu_m", vector_json(pair.enu_m)},
+                     {"local_m", offset_json(pair.local_m)},
+                     {"enu_m", offset_json(pair.enu_m)},
                      {"sigma_m", pair.sigma_m ? Ordered(*pair.sigma_m) : Ordered(nullptr)}});
   return to_wire(Ordered{{"origin", origin_json(definition.origin)},
                          {"fitted_at", to_rfc3339(definition.fitted)},

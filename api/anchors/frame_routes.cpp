@@ -53,7 +53,7 @@ void read_fields(const nlohmann::json& body, bool whole, LocalFrame& frame) {
   refuse_if_any(errors);
 }
 
-Response list(AnchorApi& s, const Request& request) {
+Response list_frames(AnchorApi& s, const Request& request) {
   check_query(request, {"limit", "cursor", "fields"});
   return id_page<FrameId>(
       request,
@@ -61,7 +61,7 @@ Response list(AnchorApi& s, const Request& request) {
       [&](const auto& frame) { return frame_json(frame); });
 }
 
-Response create(AnchorApi& s, const Request& request) {
+Response create_frame(AnchorApi& s, const Request& request) {
   LocalFrame frame;
   read_fields(json_body(request), true, frame);
   frame.site = named_or_own(frame.site);
@@ -74,7 +74,7 @@ Response create(AnchorApi& s, const Request& request) {
   return response;
 }
 
-Response patch(AnchorApi& s, const Request& request) {
+Response patch_frame(AnchorApi& s, const Request& request) {
   LocalFrame frame = find(s, request.params.at("id"));
   require_match(request, etag(frame));
   read_fields(json_body(request), false, frame);
@@ -84,7 +84,7 @@ Response patch(AnchorApi& s, const Request& request) {
   return answer(200, frame);
 }
 
-Response remove(AnchorApi& s, const Request& request) {
+Response remove_frame(AnchorApi& s, const Request& request) {
   const LocalFrame frame = find(s, request.params.at("id"));
   require_match(request, etag(frame));
   value_or_problem(s.frames.remove(frame.id, frame.version));
@@ -288,14 +288,14 @@ void add_frame_routes(Router& router, AnchorApi& s) {
     return [&s, function](const Request& request) { return function(s, request); };
   };
   const auto engineer = Access::any_of({Role::engineer});
-  router.add({Method::get, "/api/v1/frames", readers(), on(list)});
-  router.add({Method::post, "/api/v1/frames", engineer, on(create)});
+  router.add({Method::get, "/api/v1/frames", readers(), on(list_frames)});
+  router.add({Method::post, "/api/v1/frames", engineer, on(create_frame)});
   router.add({Method::get, "/api/v1/frames/{id}", readers(), [&s](const Request& request) {
                 check_query(request, {});
                 return answer(200, find(s, request.params.at("id")));
               }});
-  router.add({Method::patch, "/api/v1/frames/{id}", engineer, on(patch), 1 << 20, false, true});
-  router.add({Method::del, "/api/v1/frames/{id}", engineer, on(remove), 1 << 20, false, true});
+  router.add({Method::patch, "/api/v1/frames/{id}", engineer, on(patch_frame), 1 << 20, false, true});
+  router.add({Method::del, "/api/v1/frames/{id}", engineer, on(remove_frame), 1 << 20, false, true});
   router.add(as_heavy({Method::post, "/api/v1/frames/{id}/fit", engineer, on(fit)}));
   router.add(keeps_nothing(as_heavy({Method::post, "/api/v1/transform", readers(), on(transform)})));
 }

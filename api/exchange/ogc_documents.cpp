@@ -13,7 +13,6 @@ using Ordered = nlohmann::ordered_json;
 namespace {
 
 constexpr std::string_view k_json = "application/json";
-constexpr std::string_view k_geojson = "application/geo+json";
 constexpr std::string_view k_openapi = "application/vnd.oai.openapi+json;version=3.0";
 
 Ordered time_or_null(const std::optional<UtcTime>& time) {

@@ -10,6 +10,8 @@
 
 namespace anchord::api {
 
+inline constexpr std::string_view k_geojson = "application/geo+json";
+
 /// One collection of the OGC face. The limits keep a page at some megabytes: a flight is thousands of times
 /// an anchor.
 struct OgcCollection {

@@ -23,8 +23,6 @@ using Ordered = nlohmann::ordered_json;
 
 namespace {
 
-constexpr std::string_view k_geojson = "application/geo+json";
-
 /// Absolute, since not every client resolves a relative link. The host is the one that the client asked,
 /// which the server has judged; a proxy says whether it was by TLS.
 std::string root_of(const Request& request) {

@@ -17,7 +17,7 @@ using nlohmann::json;
 constexpr std::string_view k_format = "anchord-bundle", k_site_format = "anchord-site-bundle";
 constexpr std::uint64_t k_manifest_bytes = 4 << 20;
 
-Error refused(std::string why) { return make_error(Errc::bad_frame, std::move(why)); }
+Error manifest_refused(std::string why) { return make_error(Errc::bad_frame, std::move(why)); }
 
 /// A member of the manifest; empty or 0 where it is missing or of another kind, which no digest fits.
 std::string text_of(const json& object, const char* key) {
@@ -32,9 +32,10 @@ std::uint64_t count_of(const json& object, const char* key) {
 /// The manifest of this format as JSON. errors: bad_frame, unsupported
 Result<json> manifest_json(std::string_view text, std::string_view format, const char* of) {
   json root;
-  if (const auto error = parse_json(text, root)) return refused("the manifest is not JSON: " + error->detail);
+  if (const auto error = parse_json(text, root))
+    return manifest_refused("the manifest is not JSON: " + error->detail);
   if (text_of(root, "format") != format)
-    return refused(std::string("the manifest is not that of a ") + of + " bundle");
+    return manifest_refused(std::string("the manifest is not that of a ") + of + " bundle");
   if (const auto version = count_of(root, "version"); version != k_bundle_version)
     return make_error(Errc::unsupported, "the bundle is of version " + std::to_string(version) +
                                              " of the format, this server reads " +
@@ -44,7 +45,7 @@ Result<json> manifest_json(std::string_view text, std::string_view format, const
 
 Result<std::string> manifest_text(const ZipReader& zip, const char* of) {
   if (!zip.has(k_bundle_manifest))
-    return refused(std::string("this is not a valid ") + of + " bundle: it has no manifest.json");
+    return manifest_refused(std::string("this is not a valid ") + of + " bundle: it has no manifest.json");
   return zip.text(k_bundle_manifest, k_manifest_bytes);
 }
 
@@ -58,7 +59,7 @@ nlohmann::ordered_json entries_json(const std::vector<BundleEntry>& entries) {
 
 Result<std::vector<BundleEntry>> read_entries(const json& root) {
   const auto entries = root.find("entries");
-  if (entries == root.end() || !entries->is_array()) return refused("the manifest has no entries");
+  if (entries == root.end() || !entries->is_array()) return manifest_refused("the manifest has no entries");
   std::vector<BundleEntry> out;
   for (const auto& entry : *entries)
     out.push_back({text_of(entry, "name"), count_of(entry, "bytes"), count_of(entry, "rows"),
@@ -91,7 +92,7 @@ Result<void> check_entries(const ZipReader& zip, const std::vector<BundleEntry>&
   for (const auto& entry : zip.entries()) {
     if (!named.contains(entry.name)) add(entry.name + " is not in the manifest");
   }
-  if (!wrong.empty()) return refused("the bundle does not match its manifest: " + wrong);
+  if (!wrong.empty()) return manifest_refused("the bundle does not match its manifest: " + wrong);
   return boost::outcome_v2::success();
 }
 
@@ -126,13 +127,13 @@ Result<BundleManifest> read_bundle_manifest(std::string_view text) {
   BundleManifest out;
   const auto mission = root.find("mission");
   const auto id = parse_uuid(mission != root.end() ? text_of(*mission, "id") : std::string{});
-  if (!id) return refused("the manifest gives no mission");
+  if (!id) return manifest_refused("the manifest gives no mission");
   out.mission = MissionId{id.value()};
   out.mission_name = text_of(*mission, "name");
   out.made_by = text_of(root, "made_by");
   BOOST_OUTCOME_TRY(out.entries, read_entries(root));
   if (text_of(root, "digest") != "sha256:" + bundle_digest(out))
-    return refused("the manifest was changed: its digest does not match its entries");
+    return manifest_refused("the manifest was changed: its digest does not match its entries");
   return out;
 }
 
@@ -179,13 +180,13 @@ Result<SiteManifest> read_site_manifest(std::string_view text) {
   SiteManifest out;
   const auto site = root.find("site");
   const auto id = parse_uuid(site != root.end() ? text_of(*site, "id") : std::string{});
-  if (!id) return refused("the manifest gives no site");
+  if (!id) return manifest_refused("the manifest gives no site");
   out.site = SiteId{id.value()};
   out.site_name = text_of(*site, "name");
   out.made_by = text_of(root, "made_by");
   BOOST_OUTCOME_TRY(out.entries, read_entries(root));
   if (text_of(root, "digest") != "sha256:" + site_bundle_digest(out))
-    return refused("the manifest was changed: its digest does not match its entries");
+    return manifest_refused("the manifest was changed: its digest does not match its entries");
   return out;
 }
 

@@ -7,6 +7,7 @@
 #include <set>
 #include <utility>
 
+#include "api/formats/foreign_values.hpp"
 #include "api/formats/globe_track.hpp"
 #include "api/wire/row_limits.hpp"
 #include "core/base/text.hpp"
@@ -53,10 +54,6 @@ struct Reading {
   std::optional<std::string> crs, heights;
   bool heights_matter{};
 };
-
-bool contains(std::string_view text, std::string_view part) {
-  return text.find(part) != std::string_view::npos;
-}
 
 /// Nothing where nothing says it, and where it is sea level by a geoid that nothing names.
 std::optional<std::string> heights_by_name(const ForeignTable& track, const Reading& reading) {

@@ -159,11 +159,11 @@ constexpr std::array k_worded{
     FixWords{k_single, " single spp autonomous gnss gps 2d 3d 2d_fix 3d_fix "},
     FixWords{k_none, " none no_fix nofix no invalid "}};
 
+}  // namespace
+
 bool contains(std::string_view text, std::string_view part) {
   return text.find(part) != std::string_view::npos;
 }
-
-}  // namespace
 
 double per_metre(LengthUnit unit) {
   switch (unit) {

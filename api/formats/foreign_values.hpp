@@ -39,6 +39,8 @@ inline constexpr auto k_fix_numbers_words = enum_table<FixNumbers>({{"words", Fi
                                                                     {"rtklib", FixNumbers::rtklib},
                                                                     {"mavlink", FixNumbers::mavlink}});
 
+bool contains(std::string_view text, std::string_view part);
+
 /// By the name of the column, else by how its first value looks.
 TimeReading time_reading(const ForeignTable& table, std::string_view column);
 /// By the ending of a column's name.

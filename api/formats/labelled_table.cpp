@@ -27,7 +27,7 @@ Error at_line(const std::string& file, const GzipLines& lines, const std::string
   return make_error(Errc::bad_frame, file + ":" + std::to_string(lines.line_number()) + ": " + what);
 }
 
-double number(std::string_view cell, bool decimal_comma = false) {
+double number_or_nan(std::string_view cell, bool decimal_comma = false) {
   return cell_number(cell, decimal_comma).value_or(k_nan);
 }
 
@@ -115,8 +115,9 @@ Result<CirTable> read_cir(const std::filesystem::path& path) {
         if (std::find(k_joins.begin(), k_joins.end(), cells[c]) != k_joins.end()) {
           joins.push_back(c);
           out.join_names.emplace_back(cells[c]);
-        } else if (cells[c].size() > 1 && cells[c][0] == 'm' && !std::isnan(number(cells[c].substr(1))))
-          taps.emplace_back(static_cast<std::size_t>(number(cells[c].substr(1))), c);
+        } else if (cells[c].size() > 1 && cells[c][0] == 'm' &&
+                   !std::isnan(number_or_nan(cells[c].substr(1))))
+          taps.emplace_back(static_cast<std::size_t>(number_or_nan(cells[c].substr(1))), c);
       }
       std::sort(taps.begin(), taps.end());
       if (joins.empty() || taps.size() < 32)
@@ -129,16 +130,17 @@ Result<CirTable> read_cir(const std::filesystem::path& path) {
       return at_line(path.string(), lines,
                      std::to_string(cells.size()) + " cells, the header has " + std::to_string(width));
     magnitude.clear();
-    for (const auto& [tap, column] : taps) magnitude.push_back(static_cast<float>(number(cells[column])));
+    for (const auto& [tap, column] : taps)
+      magnitude.push_back(static_cast<float>(number_or_nan(cells[column])));
     if (std::any_of(magnitude.begin(), magnitude.end(), [](float v) { return std::isnan(v); })) continue;
     out.taps.emplace(joined(cells, joins), magnitude);
   }
   return out;
 }
 
-class Reader {
+class TableReader {
  public:
-  Reader(const TableOptions& options, bool several_files)
+  TableReader(const TableOptions& options, bool several_files)
       : options_{options}, several_files_{several_files} {}
 
   Result<void> read(const std::filesystem::path& path, const CirTable* cir) {
@@ -327,7 +329,7 @@ class Reader {
   /// 1 for yes, 0 for no, and the classes by their names.
   static std::optional<char> class_word(std::string_view cell) {
     const auto word = plain_name(cell);
-    const double value = number(cell);
+    const double value = number_or_nan(cell);
     if (value == 0 || word == "false" || word == "no") return '0';
     if (value == 1 || word == "true" || word == "yes") return '1';
     if (word == "los") return 'L';
@@ -354,7 +356,7 @@ class Reader {
   void take_row(const std::vector<std::string_view>& cells, std::size_t line,
                 const std::vector<float>* taps) {
     values_.clear();
-    for (const auto cell : cells) values_.push_back(number(cell, decimal_comma_));
+    for (const auto cell : cells) values_.push_back(number_or_nan(cell, decimal_comma_));
     const auto value = [&](const Names& names) {
       const auto at = level_columns_.at(&names);
       return at == k_none ? std::nullopt : finite(values_[at]);
@@ -435,7 +437,7 @@ class Reader {
     if (los_value.empty()) los_value = *std::min_element(labels_.begin(), labels_.end());
     std::size_t los = 0;
     for (std::size_t i = 0; i < labels_.size(); ++i) {
-      const double a = number(labels_[i]), b = number(los_value);
+      const double a = number_or_nan(labels_[i]), b = number_or_nan(los_value);
       out_.los[i] = !std::isnan(a) && !std::isnan(b) ? a == b : labels_[i] == los_value;
       los += *out_.los[i] ? 1 : 0;
     }
@@ -468,7 +470,7 @@ Result<LabelledTable> read_labelled_tables(std::span<const std::filesystem::path
   if (options.cir) {
     BOOST_OUTCOME_TRY(cir, read_cir(*options.cir));
   }
-  Reader reader{options, paths.size() > 1};
+  TableReader reader{options, paths.size() > 1};
   for (const auto& path : paths) {
     BOOST_OUTCOME_TRY(reader.read(path, cir ? &*cir : nullptr));
   }

@@ -11,16 +11,16 @@ namespace anchord::api {
 namespace {
 
 using Json = nlohmann::json;
-using LonLat = Eigen::Vector2d;
+using Corner = Eigen::Vector2d;  // longitude, latitude
 
 /// Members that GeoJSON allows beside ours are left alone (RFC 7946 section 6.1), so unknown ones are no
 /// error here.
-class Reader {
+class OutlineReader {
  public:
-  explicit Reader(std::vector<FieldError>& errors) : errors_(errors) {}
+  explicit OutlineReader(std::vector<FieldError>& errors) : errors_(errors) {}
 
   struct Area {
-    std::vector<LonLat> corners;
+    std::vector<Corner> corners;
     std::string kind;
     std::string at;
     std::optional<double> height_m;
@@ -67,7 +67,7 @@ class Reader {
     if (coordinates == json.end() || !coordinates->is_array() || coordinates->empty())
       return fail(at + "/coordinates", "required", "must be an array of rings of [lon, lat]");
     if (!many) return polygon(*coordinates, at + "/coordinates", std::move(area));
-    std::vector<LonLat> all;
+    std::vector<Corner> all;
     const std::size_t wrong = errors_.size();
     for (std::size_t i = 0; i < coordinates->size(); ++i) {
       polygon((*coordinates)[i], at + "/coordinates/" + std::to_string(i), area);
@@ -82,16 +82,16 @@ class Reader {
   }
 
   /// Andrew's monotone chain.
-  static std::vector<LonLat> hull(std::vector<LonLat> points) {
-    std::sort(points.begin(), points.end(), [](const LonLat& a, const LonLat& b) {
+  static std::vector<Corner> hull(std::vector<Corner> points) {
+    std::sort(points.begin(), points.end(), [](const Corner& a, const Corner& b) {
       return std::pair(a.x(), a.y()) < std::pair(b.x(), b.y());
     });
-    std::vector<LonLat> out;
+    std::vector<Corner> out;
     for (int pass = 0; pass < 2; ++pass) {
       const std::size_t begin = out.size();
       for (const auto& p : points) {
         while (out.size() >= begin + 2) {
-          const LonLat u = out.back() - out[out.size() - 2], v = p - out.back();
+          const Corner u = out.back() - out[out.size() - 2], v = p - out.back();
           if (u.x() * v.y() - u.y() * v.x() > 0) break;
           out.pop_back();
         }
@@ -116,7 +116,7 @@ class Reader {
       if (!p.is_array() || p.size() < 2 || !p[0].is_number() || !p[1].is_number()) {
         return fail(here, "wrong_type", "must be [lon, lat] in degrees");
       }
-      LonLat corner{p[0].get<double>(), p[1].get<double>()};
+      Corner corner{p[0].get<double>(), p[1].get<double>()};
       if (!(std::abs(corner.x()) <= 180) || !(std::abs(corner.y()) <= 90)) {
         return fail(here, "out_of_range",
                     "longitude -180..180, latitude -90..90 (GeoJSON has longitude first)");
@@ -134,10 +134,10 @@ class Reader {
     areas.push_back(std::move(area));
   }
 
-  static bool crosses_itself(const std::vector<LonLat>& ring) {
+  static bool crosses_itself(const std::vector<Corner>& ring) {
     const std::size_t n = ring.size();
     if (n > 2000) return false;  // a survey, not a slip of the mouse; the square of it would take seconds
-    const auto side = [](const LonLat& a, const LonLat& b, const LonLat& p) {
+    const auto side = [](const Corner& a, const Corner& b, const Corner& p) {
       return (b.x() - a.x()) * (p.y() - a.y()) - (b.y() - a.y()) * (p.x() - a.x());
     };
     for (std::size_t i = 0; i < n; ++i) {
@@ -180,9 +180,9 @@ std::optional<OutlineRequest> read_outline(std::string_view text, std::vector<Fi
     errors.push_back(*broken);
     return std::nullopt;
   }
-  Reader reader(errors);
+  OutlineReader reader(errors);
   reader.object(json, "", nullptr);
-  const Reader::Area* outline = nullptr;
+  const OutlineReader::Area* outline = nullptr;
   for (const auto& area : reader.areas) {
     if (area.kind == "no_fly" || area.kind == "fence") continue;
     if (outline != nullptr) {
@@ -197,11 +197,11 @@ std::optional<OutlineRequest> read_outline(std::string_view text, std::vector<Fi
   if (!errors.empty()) return std::nullopt;
 
   OutlineRequest out;
-  LonLat middle{0, 0};
+  Corner middle{0, 0};
   for (const auto& corner : outline->corners) middle += corner / static_cast<double>(outline->corners.size());
   out.origin = {middle.y(), std::remainder(middle.x(), 360.0), 0};
   const EnuFrame frame(out.origin);
-  const auto metres = [&](const std::vector<LonLat>& corners) {
+  const auto metres = [&](const std::vector<Corner>& corners) {
     planning::Polygon polygon;
     for (const auto& c : corners) polygon.push_back(frame.enu_from_wgs84({c.y(), c.x(), 0}).m.head<2>());
     return polygon;

@@ -24,7 +24,7 @@ namespace {
 
 constexpr std::uint64_t k_max_import_bytes = 32ULL << 20;
 
-CampaignRecord named(LearningApi& l, const Request& request) {
+CampaignRecord named_campaign(LearningApi& l, const Request& request) {
   const auto& text = request.params.at("id");
   if (const auto id = parse_uuid(text))
     return value_or_problem(l.stores.campaigns.campaign(CampaignId{id.value()}));
@@ -41,7 +41,7 @@ Response whole(LearningApi& l, int status, const CampaignRecord& campaign) {
 /// The grid of the dissertation's campaign: what is measured and, cell by cell, what is missing.
 Response schedule(LearningApi& l, const Request& request) {
   check_query(request, {"environment", "los", "samples", "limit", "cursor"});
-  const CampaignRecord campaign = named(l, request);
+  const CampaignRecord campaign = named_campaign(l, request);
   const auto page = page_query(request, CampaignGrid::k_cells);
   const auto wanted = static_cast<std::size_t>(query_number(request, "samples", 1, 1e6).value_or(1));
   ScheduleFilter filter;
@@ -96,7 +96,7 @@ Response schedule(LearningApi& l, const Request& request) {
                              {"next_cursor", next.empty() ? Ordered(nullptr) : Ordered(next)}});
 }
 
-Response list(LearningApi& l, const Request& request) {
+Response list_campaigns(LearningApi& l, const Request& request) {
   check_query(request, {"limit", "cursor", "fields"});
   return id_page<CampaignId>(
       request,
@@ -106,7 +106,7 @@ Response list(LearningApi& l, const Request& request) {
       [&](const auto& campaign) { return campaign_json(campaign, nullptr); });
 }
 
-Response create(LearningApi& l, const Request& request) {
+Response create_campaign(LearningApi& l, const Request& request) {
   std::vector<FieldError> errors;
   CampaignRecord campaign;
   patch_campaign(json_body(request), true, campaign, errors);
@@ -120,8 +120,8 @@ Response create(LearningApi& l, const Request& request) {
   return response;
 }
 
-Response patch(LearningApi& l, const Request& request) {
-  CampaignRecord campaign = named(l, request);
+Response change_campaign(LearningApi& l, const Request& request) {
+  CampaignRecord campaign = named_campaign(l, request);
   require_match(request, "\"c-" + std::to_string(campaign.version) + "\"");
   std::vector<FieldError> errors;
   patch_campaign(json_body(request), false, campaign, errors);
@@ -134,7 +134,7 @@ Response patch(LearningApi& l, const Request& request) {
 Response import(LearningApi& l, const Request& request) {
   check_query(request, {"dry_run", "environment", "setting", "material", "distance_m", "heading_deg",
                         "height_difference_m", "thickness_m", "los"});
-  const CampaignRecord campaign = named(l, request);
+  const CampaignRecord campaign = named_campaign(l, request);
   const bool dry_run = query_flag(request, "dry_run");
   auto read = read_campaign_rows(request);
   CampaignStore::Appended done;
@@ -203,7 +203,7 @@ Response samples(LearningApi& l, const Request& request) {
   const auto page = page_query(request, 10'000);
   const bool with_features = query_flag(request, "features");
   CampaignStore::Filter filter;
-  filter.campaign = named(l, request).id;
+  filter.campaign = named_campaign(l, request).id;
   filter.setting = request.query_value("setting");
   filter.environment = request.query_value("environment");
   filter.limits = query_limits(request);
@@ -267,7 +267,7 @@ Response sample_cir(LearningApi& l, const Request& request) {
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), id);
   if (error != std::errc{} || end != text.data() + text.size())
     throw_problem(404, "not-found", "no sample " + to_utf8(text, 40));
-  const auto row = value_or_problem(l.stores.campaigns.sample(named(l, request).id, id));
+  const auto row = value_or_problem(l.stores.campaigns.sample(named_campaign(l, request).id, id));
   if (!row.sample.cir) throw_problem(404, "not-found", "this sample has no impulse response");
   if (negotiate(request, {"json", "binary"}) == "json") return json_response(200, cir_json(*row.sample.cir));
   Response response;
@@ -323,16 +323,16 @@ void add_campaign_routes(Router& router, LearningApi& l) {
     return [&l, function](const Request& request) { return function(l, request); };
   };
   const auto writers = Access::any_of({Role::gateway, Role::engineer});
-  router.add({Method::get, "/api/v1/campaigns", readers(), on(list)});
-  router.add({Method::post, "/api/v1/campaigns", writers, on(create)});
+  router.add({Method::get, "/api/v1/campaigns", readers(), on(list_campaigns)});
+  router.add({Method::post, "/api/v1/campaigns", writers, on(create_campaign)});
   router.add({Method::get, "/api/v1/campaigns/{id}", readers(), [&l](const Request& request) {
                 check_query(request, {});
-                return whole(l, 200, named(l, request));
+                return whole(l, 200, named_campaign(l, request));
               }});
-  router.add({Method::patch, "/api/v1/campaigns/{id}", writers, on(patch), 1 << 20, false, true});
+  router.add({Method::patch, "/api/v1/campaigns/{id}", writers, on(change_campaign), 1 << 20, false, true});
   router.add(
       {Method::del, "/api/v1/campaigns/{id}", Access::any_of({Role::engineer}), [&l](const Request& request) {
-         const auto campaign = named(l, request);
+         const auto campaign = named_campaign(l, request);
          refuse_while_trained_on(l, campaign);
          value_or_problem(l.stores.campaigns.remove(campaign.id));
          l.audit(request, "campaign.delete " + to_string(campaign.id) + " " + campaign.name);

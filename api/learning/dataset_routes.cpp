@@ -25,11 +25,11 @@ namespace {
 
 constexpr std::uint64_t k_max_csv_bytes = 32ULL << 20;
 
-DatasetRecord named(LearningApi& l, const Request& request) {
+DatasetRecord named_dataset(LearningApi& l, const Request& request) {
   return find_dataset(l.stores, request.params.at("id"));
 }
 
-Response list(LearningApi& l, const Request& request) {
+Response list_datasets(LearningApi& l, const Request& request) {
   check_query(request, {"limit", "cursor", "fields"});
   return id_page<DatasetId>(
       request,
@@ -47,7 +47,7 @@ FrozenDataset read_csv(const Request& request) {
   return frozen_before(std::move(table).value());
 }
 
-Response create(LearningApi& l, const Request& request) {
+Response create_dataset(LearningApi& l, const Request& request) {
   DatasetRecord record;
   FrozenDataset frozen;
   std::string_view type = request.header("content-type");
@@ -106,7 +106,7 @@ Ordered row_json(const DatasetTable& table, std::size_t index) {
 
 Response rows(LearningApi& l, const Request& request) {
   check_query(request, {"limit", "cursor", "fields", "format"});
-  const auto record = named(l, request);
+  const auto record = named_dataset(l, request);
   auto csv = value_or_problem(l.stores.datasets.csv(record.id));
   const std::string format = negotiate(request, {"json", "csv", "ndjson"});
   Response response;
@@ -134,7 +134,7 @@ Response rows(LearningApi& l, const Request& request) {
 /// Tables 5.2 and 5.3 for this data set.
 Response rules(LearningApi& l, const Request& request) {
   check_query(request, {"group_by", "seed"});
-  const auto record = named(l, request);
+  const auto record = named_dataset(l, request);
   std::uint64_t seed = 1;
   if (const auto text = request.query_value("seed")) {
     const auto [end, error] = std::from_chars(text->data(), text->data() + text->size(), seed);
@@ -161,17 +161,17 @@ void add_dataset_routes(Router& router, LearningApi& l) {
     return [&l, function](const Request& request) { return function(l, request); };
   };
   const auto engineer = Access::any_of({Role::engineer});
-  router.add({Method::get, "/api/v1/datasets", readers(), on(list)});
-  router.add(as_heavy({Method::post, "/api/v1/datasets", engineer, on(create), k_max_csv_bytes}));
+  router.add({Method::get, "/api/v1/datasets", readers(), on(list_datasets)});
+  router.add(as_heavy({Method::post, "/api/v1/datasets", engineer, on(create_dataset), k_max_csv_bytes}));
   router.add({Method::get, "/api/v1/datasets/{id}", readers(), [&l](const Request& request) {
                 check_query(request, {});
-                const auto record = named(l, request);
+                const auto record = named_dataset(l, request);
                 Response response = json_response(200, dataset_json(record, true));
                 response.header("ETag", "\"" + record.digest + "\"");
                 return response;
               }});
   router.add({Method::del, "/api/v1/datasets/{id}", engineer, [&l](const Request& request) {
-                const auto record = named(l, request);
+                const auto record = named_dataset(l, request);
                 value_or_problem(l.stores.datasets.remove(record.id));
                 l.audit(request, "dataset.delete " + to_string(record.id) + " " + record.digest);
                 Response response;

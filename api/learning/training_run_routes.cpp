@@ -24,7 +24,7 @@ Ordered run_json(LearningApi& l, const TrainingRun& run, bool whole) {
   return training_run_json(run, dataset, job, whole);
 }
 
-Response list(LearningApi& l, const Request& request) {
+Response list_training_runs(LearningApi& l, const Request& request) {
   check_query(request, {"limit", "cursor", "fields", "task"});
   const auto task = request.query_value("task");
   return id_page<TrainingRunId>(
@@ -42,7 +42,7 @@ Response finished(LearningApi& l, const Job& job) {
   return response;
 }
 
-Response create(LearningApi& l, const Request& request) {
+Response create_training_run(LearningApi& l, const Request& request) {
   check_query(request, {});
   const auto body = json_body(request);
   std::vector<FieldError> errors;
@@ -75,7 +75,7 @@ Response create(LearningApi& l, const Request& request) {
   return job_outcome(l.jobs, request, std::move(job), [&](const Job& done) { return finished(l, done); });
 }
 
-Response restart(LearningApi& l, const Request& request) {
+Response restart_training_run(LearningApi& l, const Request& request) {
   check_query(request, {});
   auto job = l.training.restart(path_id<TrainingRunId>(request));
   if (!job && job.error().code == Errc::conflict) throw_problem(422, "state", job.error().message);
@@ -84,7 +84,7 @@ Response restart(LearningApi& l, const Request& request) {
   return job_outcome(l.jobs, request, std::move(again), [&](const Job& done) { return finished(l, done); });
 }
 
-Response remove(LearningApi& l, const Request& request) {
+Response remove_training_run(LearningApi& l, const Request& request) {
   const auto id = path_id<TrainingRunId>(request);
   const auto run = value_or_problem(l.stores.runs.run(id));
   const auto job = value_or_problem(l.job_store.job(JobId{id.uuid}));
@@ -132,16 +132,16 @@ void add_training_run_routes(Router& router, LearningApi& l) {
   };
   const auto engineer = Access::any_of({Role::engineer});
   const std::string base = "/api/v1/training-runs";
-  router.add({Method::get, base, readers(), on(list)});
-  router.add({Method::post, base, engineer, on(create)});
+  router.add({Method::get, base, readers(), on(list_training_runs)});
+  router.add({Method::post, base, engineer, on(create_training_run)});
   router.add({Method::get, base + "/{id}", readers(), [&l](const Request& request) {
                 check_query(request, {});
                 return json_response(
                     200,
                     run_json(l, value_or_problem(l.stores.runs.run(path_id<TrainingRunId>(request))), true));
               }});
-  router.add({Method::del, base + "/{id}", engineer, on(remove)});
-  router.add({Method::post, base + "/{id}/restart", engineer, on(restart)});
+  router.add({Method::del, base + "/{id}", engineer, on(remove_training_run)});
+  router.add({Method::post, base + "/{id}/restart", engineer, on(restart_training_run)});
   for (const char* name : {"folds", "grid", "importance", "selection", "confusion", "roc", "cdf"}) {
     router.add(as_heavy({Method::get, base + "/{id}/" + name, readers(),
                          [&l, name](const Request& request) { return part(l, request, name); }}));

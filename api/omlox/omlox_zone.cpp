@@ -26,7 +26,7 @@ constexpr std::size_t k_most_places = 1000;  ///< buildings of a site, floors of
 
 double rounded(double value, double steps) { return std::round(value * steps) / steps; }
 double degrees(double value) { return rounded(value, 1e9); }
-double metres(double value) { return rounded(value, 1e4); }
+double zone_metres(double value) { return rounded(value, 1e4); }
 
 std::optional<double> level_of(const std::string& text) {
   double value = 0;
@@ -147,15 +147,15 @@ Ordered properties(const OmloxZone& zone) {
                 {"status", anchor.status},
                 {"lon", degrees(anchor.at.lon_deg)},
                 {"lat", degrees(anchor.at.lat_deg)},
-                {"h_m", metres(anchor.at.height_m)}};
+                {"h_m", zone_metres(anchor.at.height_m)}};
     one["local_m"] = nullptr;
     if (anchor.local_m)
-      one["local_m"] = {metres(anchor.local_m->x()), metres(anchor.local_m->y()),
-                        metres(anchor.local_m->z())};
+      one["local_m"] = {zone_metres(anchor.local_m->x()), zone_metres(anchor.local_m->y()),
+                        zone_metres(anchor.local_m->z())};
     anchors.push_back(std::move(one));
   }
   Ordered ours{{"zone", to_string(zone.id)}, {"revision", zone.revision}};
-  ours["h95_m"] = zone.h95_m ? Ordered(metres(*zone.h95_m)) : Ordered(nullptr);
+  ours["h95_m"] = zone.h95_m ? Ordered(zone_metres(*zone.h95_m)) : Ordered(nullptr);
   ours["anchors"] = std::move(anchors);
   Ordered out = Ordered::object();
   out["anchord"] = std::move(ours);
@@ -218,13 +218,13 @@ std::vector<OmloxZone> omlox_zones(AnchorApi& s, PlaceStore& places) {
 
 Ordered omlox_point(const Wgs84& at, bool with_height) {
   Ordered coordinates = Ordered::array({degrees(at.lon_deg), degrees(at.lat_deg)});
-  if (with_height) coordinates.push_back(metres(at.height_m));
+  if (with_height) coordinates.push_back(zone_metres(at.height_m));
   return {{"type", "Point"}, {"coordinates", std::move(coordinates)}};
 }
 
 Ordered omlox_local_point(const Eigen::Vector3d& local_m, bool with_height) {
-  Ordered coordinates = Ordered::array({metres(local_m.x()), metres(local_m.y())});
-  if (with_height) coordinates.push_back(metres(local_m.z()));
+  Ordered coordinates = Ordered::array({zone_metres(local_m.x()), zone_metres(local_m.y())});
+  if (with_height) coordinates.push_back(zone_metres(local_m.z()));
   return {{"type", "Point"}, {"coordinates", std::move(coordinates)}};
 }
 
@@ -240,7 +240,7 @@ Ordered omlox_zone_json(const OmloxZone& zone, OmloxDialect dialect) {
   if (!zone.site.empty()) out["site"] = zone.site;
   if (!zone.building.empty()) out["building"] = zone.building;
   if (zone.floor) out["floor"] = *zone.floor;
-  if (zone.height_m) out["wgs84_height"] = metres(*zone.height_m);
+  if (zone.height_m) out["wgs84_height"] = zone_metres(*zone.height_m);
   if (zone.measured) out["measurement_timestamp"] = omlox_time(*zone.measured);
   out["incomplete_configuration"] = !zone.complete();
   out["ground_control_points"] = control_points(zone, dialect);

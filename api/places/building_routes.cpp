@@ -14,8 +14,6 @@ using Json = nlohmann::json;
 
 namespace {
 
-constexpr std::size_t k_max_text = 200;
-
 Building path_building(PlaceApi& s, const Request& request) {
   return value_or_problem(s.places.building(path_id<BuildingId>(request)));
 }
@@ -23,7 +21,7 @@ Building path_building(PlaceApi& s, const Request& request) {
 void read(const Json& body, Building& building, bool made) {
   std::vector<FieldError> errors;
   Fields fields(body, "", errors);
-  if (const auto name = fields.text("name", k_max_text, made)) building.name = *name;
+  if (const auto name = fields.text("name", k_max_place_text, made)) building.name = *name;
   if (const auto text = fields.text("site", 36, made)) {
     if (const auto id = parse_uuid(*text))
       building.site = SiteId{id.value()};

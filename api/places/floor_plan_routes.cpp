@@ -6,6 +6,7 @@
 #include "api/kit/support.hpp"
 #include "api/places/georeference.hpp"
 #include "api/places/place_json.hpp"
+#include "api/places/place_records.hpp"
 #include "api/places/plan_work.hpp"
 #include "api/places/routes.hpp"
 #include "api/places/structure_json.hpp"
@@ -54,10 +55,6 @@ class Reading {
   Locked<std::set<std::string>>& reading_;
   const std::string token_;
 };
-
-Floor path_floor(PlaceApi& s, const Request& request) {
-  return value_or_problem(s.places.floor(path_id<FloorId>(request)));
-}
 
 Site site_of(PlaceApi& s, const Floor& floor) {
   return value_or_problem(s.sites.site(value_or_problem(s.places.building(floor.building)).site));

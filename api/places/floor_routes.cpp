@@ -18,16 +18,10 @@ using Ordered = nlohmann::ordered_json;
 
 namespace {
 
-constexpr std::size_t k_max_text = 200;
-
-Floor path_floor(PlaceApi& s, const Request& request) {
-  return value_or_problem(s.places.floor(path_id<FloorId>(request)));
-}
-
 void read(const Json& body, Floor& floor, bool made) {
   std::vector<FieldError> errors;
   Fields fields(body, "", errors);
-  if (const auto name = fields.text("name", k_max_text, made)) floor.name = *name;
+  if (const auto name = fields.text("name", k_max_place_text, made)) floor.name = *name;
   if (made) {
     if (const auto text = fields.text("building", 36, true)) {
       if (const auto id = parse_uuid(*text))
@@ -45,7 +39,7 @@ void read(const Json& body, Floor& floor, bool made) {
   refuse_if_any(errors);
 }
 
-Response list(PlaceApi& s, const Request& request) {
+Response list_floors(PlaceApi& s, const Request& request) {
   check_query(request, {"limit", "cursor", "fields", "building"});
   const auto text = request.query_value("building");
   const auto building = cursor_id<BuildingId>(text.value_or(""));
@@ -61,7 +55,7 @@ struct FloorRecord {
   using Place = Floor;
   static constexpr const char* k_path = "/api/v1/floors";
   static constexpr const char* k_word = "floor";
-  static Response list(PlaceApi& s, const Request& request) { return api::list(s, request); }
+  static Response list(PlaceApi& s, const Request& request) { return list_floors(s, request); }
   static Place find(PlaceApi& s, const Request& request) { return path_floor(s, request); }
   static nlohmann::ordered_json json(const Place& place) { return floor_json(place); }
   static void read(const Json& body, Place& place, bool made) { api::read(body, place, made); }

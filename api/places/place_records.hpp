@@ -11,6 +11,12 @@
 
 namespace anchord::api {
 
+inline constexpr std::size_t k_max_place_text = 200;
+
+inline Floor path_floor(PlaceApi& s, const Request& request) {
+  return value_or_problem(s.places.floor(path_id<FloorId>(request)));
+}
+
 /// Routes of a building's or a floor's record, which is made, read, changed and removed in one way. Kind says
 /// what they differ in: Place; k_path, k_word; list(api, request), find(api, request), json(place), and
 /// read(body, place, made), which throws what is wrong.

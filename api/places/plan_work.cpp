@@ -35,7 +35,7 @@ constexpr std::int64_t k_max_tiled_px = 50'000;
 /// The head of a message that needs a program begins so.
 constexpr std::string_view k_page_mark = "floor_plan page ";
 
-Json pair_json(const Eigen::Vector2d& m) { return {m.x(), m.y()}; }
+Json point_json(const Eigen::Vector2d& m) { return {m.x(), m.y()}; }
 
 Result<std::string> inspect(floor_plan::Image image) {
   const int width = image.width_px, height = image.height_px;
@@ -49,7 +49,7 @@ Result<std::string> backdrop(const floor_plan::Image& image, const floor_plan::P
   BOOST_OUTCOME_TRY(const auto png,
                     floor_plan::encode_png_within(std::move(made.image), k_max_picture_bytes));
   return to_wire(
-      Json{{"low_m", pair_json(made.low_m)}, {"high_m", pair_json(made.high_m)}, {"png", base64(png)}});
+      Json{{"low_m", point_json(made.low_m)}, {"high_m", point_json(made.high_m)}, {"png", base64(png)}});
 }
 
 /// A line of JSON, then the pictures one behind the other.
@@ -61,7 +61,7 @@ Result<std::string> tiles(const floor_plan::Image& image, const floor_plan::Plan
     list.push_back({tile.level, tile.column, tile.row, tile.png.size()});
     bytes += tile.png.size();
   }
-  std::string out = to_wire(Json{{"north_west_m", pair_json(made.north_west_m)},
+  std::string out = to_wire(Json{{"north_west_m", point_json(made.north_west_m)},
                                  {"m_per_px", made.m_per_px},
                                  {"width_px", made.width_px},
                                  {"height_px", made.height_px},
@@ -126,10 +126,10 @@ Result<std::string> trace(const floor_plan::Image& image, const floor_plan::Plan
                       return !stop.stop_requested();
                     }));
   Json outline = Json::array(), walls = Json::array();
-  for (const auto& corner : found.outline_m) outline.push_back(pair_json(corner));
+  for (const auto& corner : found.outline_m) outline.push_back(point_json(corner));
   for (const auto& wall : found.walls)
-    walls.push_back({{"from_m", pair_json(wall.from_m)},
-                     {"to_m", pair_json(wall.to_m)},
+    walls.push_back({{"from_m", point_json(wall.from_m)},
+                     {"to_m", point_json(wall.to_m)},
                      {"thickness_m", wall.thickness_m}});
   return to_wire(Json{{"outline_m", std::move(outline)},
                       {"walls", std::move(walls)},
@@ -275,7 +275,7 @@ Result<std::string> asked(const RunWork& run, const SteadyClock& steady, const P
   Json head{{"task", k_task_words.word(question.task)},
             {"enu_from_pixel", {m(0, 0), m(0, 1), shift.x(), m(1, 0), m(1, 1), shift.y()}},
             {"cpu_s", question.cpu_s()}};
-  if (question.site_map_m) head["site_map_m"] = pair_json(*question.site_map_m);
+  if (question.site_map_m) head["site_map_m"] = point_json(*question.site_map_m);
   if (question.task == PlanTask::page) {
     head["page"] = question.page;
     head["dots_per_inch"] = question.dots_per_inch;

@@ -8,6 +8,7 @@
 #include "api/kit/reader.hpp"
 #include "api/kit/router.hpp"
 #include "api/stream/frames.hpp"
+#include "api/stream/steady_us.hpp"
 #include "core/base/to_wire.hpp"
 
 namespace anchord::api {
@@ -17,11 +18,6 @@ using Json = nlohmann::json;
 namespace {
 
 constexpr std::array<std::string_view, 1> k_encodings{"json"};
-
-std::int64_t steady_us() {
-  using namespace std::chrono;
-  return duration_cast<microseconds>(steady_clock::now().time_since_epoch()).count();
-}
 
 /// What a subscription that begins anew is shown first.
 std::string snap_of(const Subscription& subscription, const Resumed& start, bool keyed) {

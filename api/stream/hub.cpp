@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "api/stream/frames.hpp"
+#include "api/stream/steady_us.hpp"
 #include "core/base/check.hpp"
 #include "core/base/steady.hpp"
 
@@ -11,9 +12,6 @@ namespace {
 
 constexpr std::uint16_t k_bye_code = 4010;
 constexpr std::string_view k_bye_reason = "shutting_down";
-
-/// What the age of a message is measured by: the wall clock may step.
-std::int64_t steady_us() { return system_steady_clock().now().ns / 1000; }
 
 }  // namespace
 

@@ -11,6 +11,8 @@
 #include <cstdint>
 #include <cstring>
 
+#include "core/base/bytes.hpp"
+
 namespace anchord {
 namespace {
 
@@ -39,9 +41,6 @@ constexpr DigitBits k_digits = digit_bits();
 // EVP_EncodeBlock counts in int; both are multiples of whole groups.
 constexpr std::size_t k_raw = 3 << 20, k_coded = 4 << 20;
 
-const unsigned char* bytes_of(std::string_view text) {
-  return reinterpret_cast<const unsigned char*>(text.data());
-}
 unsigned char* bytes_at(std::string& text, std::size_t at) {
   return reinterpret_cast<unsigned char*>(text.data() + at);
 }

@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "core/base/base64.hpp"
+#include "core/base/bytes.hpp"
 #include "core/base/sha256.hpp"
 
 namespace anchord {
@@ -20,10 +21,6 @@ constexpr std::array<std::uint8_t, 12> k_info{0x30, 0x2a, 0x30, 0x05, 0x06, 0x03
 
 using Pkey = std::unique_ptr<EVP_PKEY, decltype(&EVP_PKEY_free)>;
 using Context = std::unique_ptr<EVP_MD_CTX, decltype(&EVP_MD_CTX_free)>;
-
-const unsigned char* bytes_of(std::string_view text) {
-  return reinterpret_cast<const unsigned char*>(text.data());
-}
 
 Ed25519Public open_half_of(EVP_PKEY* key) {
   Ed25519Public::Bytes bytes{};

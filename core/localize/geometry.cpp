@@ -12,7 +12,7 @@
 namespace anchord {
 namespace {
 
-std::string sentence(const char* format, double a, double b, double c) {
+std::string mirror_sentence(const char* format, double a, double b, double c) {
   char text[200];
   std::snprintf(text, sizeof text, format, a, b, c);
   return text;
@@ -53,9 +53,10 @@ GeometryReport assess_geometry(std::span<const Observation> observations, Dims d
     if (std::ranges::none_of(distinct, same)) distinct.push_back(o);
   }
   if (distinct.size() < needed) {
-    report.reason = sentence("too few: ranges from %.0f distinct places, need %.0f (%.0f ranges in all)",
-                             static_cast<double>(distinct.size()), static_cast<double>(needed),
-                             static_cast<double>(observations.size()));
+    report.reason =
+        mirror_sentence("too few: ranges from %.0f distinct places, need %.0f (%.0f ranges in all)",
+                        static_cast<double>(distinct.size()), static_cast<double>(needed),
+                        static_cast<double>(observations.size()));
     return report;
   }
   const auto usable = [](const Observation& o) { return o.tag_m.allFinite() && std::isfinite(o.distance_m); };
@@ -77,13 +78,13 @@ GeometryReport assess_geometry(std::span<const Observation> observations, Dims d
   report.plane_ratio = report.shape.sd_m.x() / report.median_range_m;
   if (report.line_ratio < limits.line) {
     report.kind = GeometryKind::collinear;
-    report.reason = sentence(
+    report.reason = mirror_sentence(
         "weak geometry: the track is a line as seen from the anchor, %.2f m wide across at a median range of "
         "%.2f m (ratio %.3f)",
         report.shape.sd_m.y(), report.median_range_m, report.line_ratio);
   } else if (dims == Dims::three && report.plane_ratio < limits.plane) {
     report.kind = GeometryKind::coplanar;
-    report.reason = sentence(
+    report.reason = mirror_sentence(
         "mirror: the track is a plane as seen from the anchor, %.2f m thick at a median range of %.2f m "
         "(ratio %.4f)",
         report.shape.sd_m.x(), report.median_range_m, report.plane_ratio);

@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "core/localize/joint_lines.hpp"
+#include "core/localize/weighed_row.hpp"
 #include "core/localize/widen.hpp"
 
 namespace anchord {
@@ -15,7 +16,6 @@ namespace {
 constexpr std::size_t k_bins = 24;  // of 15 degrees
 constexpr int k_least_ranges = 60;
 constexpr double k_least_share = 0.1, k_most_share = 0.9;  // of the ranges, in the sector
-constexpr double k_wide_scales = 3;  // beyond, a residual counts less: late ranges must not be rejected here
 constexpr double k_unit_sigma_m = 0.3;  // of the unit delay, which takes in what the bias has of the delay
 constexpr double k_place_sigma_m = 5.0;
 // Of 488 made anchors without any delay one in eight reaches the first, one in twenty twice the second; real
@@ -26,13 +26,13 @@ using Matrix5 = Eigen::Matrix<double, 5, 5>;
 using Vector5 = Eigen::Matrix<double, 5, 1>;
 
 /// Normal equations of place and unit delay (4), and of a delay of these ranges alone (last).
-struct Sums {
+struct BinSums {
   Matrix5 normal{Matrix5::Zero()};
   Vector5 pull{Vector5::Zero()};
   double square_m2{};
   double kept{};  ///< weight that the fit itself gives to these ranges
   int n{};
-  Sums& operator+=(const Sums& o) {
+  BinSums& operator+=(const BinSums& o) {
     normal += o.normal;
     pull += o.pull;
     square_m2 += o.square_m2;
@@ -41,7 +41,7 @@ struct Sums {
     return *this;
   }
 };
-using Bins = std::array<Sums, k_bins>;
+using Bins = std::array<BinSums, k_bins>;
 
 Bins by_bearing(const FlightRows& flight, const FlightOptions& options, const JointFit& fit,
                 std::size_t index) {
@@ -56,7 +56,7 @@ Bins by_bearing(const FlightRows& flight, const FlightOptions& options, const Jo
     const double weight = size_m <= wide_m ? 1.0 : wide_m * wide_m / (size_m * size_m);
     const Eigen::Vector3d ray = at.antenna_m - anchor.position_m;
     const double turns = std::atan2(ray.y(), ray.x()) / (2 * std::numbers::pi) + 0.5;
-    Sums& bin = bins[std::min(static_cast<std::size_t>(turns * k_bins), k_bins - 1)];
+    BinSums& bin = bins[std::min(static_cast<std::size_t>(turns * k_bins), k_bins - 1)];
     Vector5 by;
     by << at.by_anchor, 1.0;
     bin.normal.noalias() += weight * by * by.transpose();
@@ -76,8 +76,8 @@ struct LateSide {
 };
 
 LateSide late_side(const Bins& bins, const AnchorBlock& block) {
-  Sums all;
-  for (const Sums& bin : bins) all += bin;
+  BinSums all;
+  for (const BinSums& bin : bins) all += bin;
   LateSide best;
   if (all.n < k_least_ranges) return best;
   Eigen::Matrix4d own = all.normal.topLeftCorner<4, 4>();
@@ -89,7 +89,7 @@ LateSide late_side(const Bins& bins, const AnchorBlock& block) {
   const double without_m2 = all.square_m2 - pull.dot(inverse * pull);
   double least_m2 = without_m2;
   for (std::size_t from = 0; from < k_bins; ++from) {
-    Sums sector;
+    BinSums sector;
     for (std::size_t length = 1; length < k_bins; ++length) {
       sector += bins[(from + length - 1) % k_bins];
       const double weight = sector.normal(4, 4), share = weight / all.normal(4, 4);

@@ -21,7 +21,6 @@ constexpr double k_odd_z = 1.5;         // worth another solve
 constexpr std::size_t k_most_again = 3;
 constexpr int k_rounds = 3;
 constexpr double k_shown_z = 4, k_growing = 1.1;
-constexpr double k_wide_scales = 3;         // beyond, a residual counts less: a factor makes them large
 constexpr double k_imitated_bias_m = 0.15;  // no factor is shown by ranges that only differ from a known bias
 // As of a shift of the track.
 constexpr double k_doubted_chi2 = 3, k_believed_chi2 = 9;

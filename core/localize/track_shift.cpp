@@ -21,7 +21,6 @@ constexpr double k_velocity_over_s = 0.2;
 constexpr double k_part_s = 2.0;  // a shorter part between two breaks says nothing by itself
 constexpr std::size_t k_most_breaks = 24;
 
-constexpr double k_wide_scales = 3;  // beyond, a residual counts less: a shift makes them large
 constexpr double k_shift_sigma_m =
     1.0;  // of a shift, each axis: ambiguities and surveyed-in bases are off so
 constexpr double k_shift_chance = 0.05;  // of a flight with breaks, before its ranges are asked
@@ -34,7 +33,8 @@ constexpr std::size_t k_most_again = 8;  // shifts solved for again, the oddest 
 constexpr int k_wide_rounds = 3, k_rounds = 8;
 
 constexpr int k_own = 4, k_columns = k_own + k_shared_size + 1;
-using Sums = Eigen::Matrix<double, k_columns, k_columns>;  // products of (by_anchor, by_shared, residual)
+using ShiftSums =
+    Eigen::Matrix<double, k_columns, k_columns>;  // products of (by_anchor, by_shared, residual)
 using Shared3 = Eigen::Matrix<double, k_shared_size, 3>;
 using Own3 = Eigen::Matrix<double, k_own, 3>;
 
@@ -149,8 +149,8 @@ WeighedRow weighed(const JointRow& row, const JointLine& line, const AnchorBlock
 
 /// One anchor: its sums by part of the track, and its normal equations with its priors.
 struct AnchorParts {
-  std::vector<Sums> parts{};
-  Sums all{Sums::Zero()};
+  std::vector<ShiftSums> parts{};
+  ShiftSums all{ShiftSums::Zero()};
   Eigen::Matrix4d own_inverse{Eigen::Matrix4d::Zero()};
   Eigen::Vector4d gradient{Eigen::Vector4d::Zero()};
   Eigen::Matrix<double, k_own, k_shared_size> shared{Eigen::Matrix<double, k_own, k_shared_size>::Zero()};
@@ -228,7 +228,7 @@ AnchorParts ShiftTest::parts_of(std::size_t index) const {
     lines.push_back({&row, std::move(line), part});
   }
   AnchorParts out;
-  out.parts.assign(breaks.size() + 1, Sums::Zero());
+  out.parts.assign(breaks.size() + 1, ShiftSums::Zero());
   out.scale_m =
       sizes_m.empty() ? block.scale_m : std::max(1.4826 * upper_median(sizes_m), options.min_scale_m);
   for (const Line& line : lines) {
@@ -237,7 +237,7 @@ AnchorParts ShiftTest::parts_of(std::size_t index) const {
     columns << line.at.by_anchor, line.at.by_shared, by.residual_m;
     out.parts[line.part].noalias() += by.per_m2 * columns * columns.transpose();
   }
-  for (const Sums& part : out.parts) out.all += part;
+  for (const ShiftSums& part : out.parts) out.all += part;
   out.shared = out.all.block<k_own, k_shared_size>(0, k_own);
   if (options.dims == Dims::two) out.shared.row(2).setZero();
   out.gradient = out.all.topRightCorner<k_own, 1>();
@@ -267,7 +267,7 @@ ShiftTest::Column ShiftTest::column_of(const Shifted& parts) const {
   Column out;
   Shared3 with_shared = Shared3::Zero();
   for (const AnchorParts& anchor : anchors_) {
-    Sums sums = Sums::Zero();
+    ShiftSums sums = ShiftSums::Zero();
     for (std::size_t k = 0; k < anchor.parts.size(); ++k)
       if (parts.has(k)) sums += anchor.parts[k];
     Own3 own = -sums.topLeftCorner<k_own, 3>();

@@ -7,10 +7,12 @@
 #include <string>
 #include <vector>
 
+#include "core/base/angle.hpp"
+
 namespace anchord {
 namespace {
 
-constexpr double k_turn = 2 * std::numbers::pi, k_degree = std::numbers::pi / 180;
+constexpr double k_turn = 2 * std::numbers::pi;
 constexpr std::array k_lobes_rad{120 * k_degree, 250 * k_degree};  // Fig 8.4a
 constexpr double k_lobe_width_rad =
     35 * k_degree;              // chosen: the lobes of the figure fall to half in about 40 degrees

@@ -16,6 +16,10 @@ struct WeighedRow {
 WeighedRow weighed_row(const JointRow& row, const JointLine& line, const AnchorBlock& block, double scale_m,
                        const FlightOptions& options);
 
+/// Scales beyond which a residual counts less where systematic errors are asked for: they make residuals
+/// large, and rejected ranges would not show them.
+inline constexpr double k_wide_scales = 3;
+
 /// Variance that a residual is held against: the scale, and what the track adds to what it usually adds, m^2.
 double row_variance_m2(const JointLine& line, const AnchorBlock& block, double scale_m);
 

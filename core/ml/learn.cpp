@@ -14,9 +14,6 @@ namespace {
 // Log losses closer than this are noise on a few hundred placements: then the order of the candidates
 // decides.
 constexpr double k_tie_log_loss = 0.01;
-// Metres of mean error that one metre of harm done to the worst place is worth.
-constexpr double k_harm_price = 0.5;
-constexpr double k_harmless_m = 0.02;
 
 std::string fixed(double value, int digits) {
   std::array<char, 32> text{};

@@ -8,8 +8,6 @@
 namespace anchord::ml {
 namespace {
 
-constexpr double k_harm_price = 0.5;  // metres of mean error that a metre of harm to the worst place is worth
-constexpr double k_harmless_m = 0.02;
 // A no-harm pick is taken where it keeps this share of what the best one saves.
 constexpr double k_kept_saving = 0.5;
 // Nats of mean likelihood within which the tail that corrects best is taken: a few dozen places tell no

@@ -4,6 +4,10 @@
 
 namespace anchord::ml {
 
+/// Metres of mean error that a metre of harm done to the worst place is worth; less harm than the second is
+/// none.
+inline constexpr double k_harm_price = 0.5, k_harmless_m = 0.02;
+
 /// Identification alone: candidates, pick, refit, calibration.
 Result<Learned> learn_class(const Dataset& data, const LearnOptions& options,
                             const std::vector<std::size_t>& fold);

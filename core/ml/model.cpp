@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "core/base/check.hpp"
+#include "core/ml/sigmoid.hpp"
 
 namespace anchord::ml {
 namespace {
@@ -73,8 +74,6 @@ double raw(const Svm& m, std::span<const double> x) {
   }
   return sum;
 }
-
-double sigmoid(double z) { return 1 / (1 + std::exp(-z)); }
 
 }  // namespace
 

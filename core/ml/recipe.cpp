@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <map>
 
+#include "core/ml/sigmoid.hpp"
 #include "core/ml/train_opencv.hpp"
 
 namespace anchord::ml {
@@ -73,8 +74,6 @@ std::string number(double value) {
   std::snprintf(text.data(), text.size(), "%g", value);
   return text.data();
 }
-
-double sigmoid(double z) { return 1 / (1 + std::exp(-z)); }
 
 }  // namespace
 

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "core/planning/cross.hpp"
+
 namespace anchord::planning {
 namespace {
 
@@ -11,8 +13,6 @@ using Eigen::Vector2d;
 
 /// A way that runs along a keep-out distance is legal; rounding must not turn it into one that is not.
 constexpr double k_slack_m = 1e-9;
-
-double cross(const Vector2d& a, const Vector2d& b) { return a.x() * b.y() - a.y() * b.x(); }
 
 int side_of(const Vector2d& a, const Vector2d& b, const Vector2d& p) {
   const double value = cross(b - a, p - a);

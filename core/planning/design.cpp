@@ -5,10 +5,10 @@
 #include <cmath>
 #include <optional>
 
+#include "core/planning/cross.hpp"
+
 namespace anchord::planning {
 namespace {
-
-double cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) { return a.x() * b.y() - a.y() * b.x(); }
 
 constexpr double k_facade_m = 0.6;
 

@@ -2,13 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <utility>
+
+#include "core/base/angle.hpp"
 
 namespace anchord::procedure {
 namespace {
 
-constexpr double k_degree = std::numbers::pi / 180;
 constexpr double k_steer_s = 1.0, k_tell_again_s = 3.0;
 /// Of the smoothing: at rest, and under way, where a late position looks like a wrong one.
 constexpr double k_rest_s = 3.0, k_moving_s = 15.0, k_moving_mps = 0.7;

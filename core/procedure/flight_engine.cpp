@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "core/base/angle.hpp"
 #include "core/planning/local_plan.hpp"
 #include "core/planning/route.hpp"
 
@@ -17,7 +18,6 @@ constexpr int k_in_range = 3;        ///< ranges that make an anchor heard
 constexpr double k_late_s = 0.5;     ///< latency and period of telemetry on a poor link
 constexpr double k_latest_s =
     1.0;  ///< of two positions that are compared; older ones are an alarm of their own
-constexpr double k_degree = std::numbers::pi / 180;
 
 double apart(double a, double b) { return std::abs(std::remainder(a - b, 2 * std::numbers::pi)); }
 

@@ -5,8 +5,8 @@
 namespace anchord::drone {
 namespace {
 
-constexpr double k_silent_s = 10;     ///< the heartbeat comes each second
-constexpr std::size_t k_others = 32;  ///< of a hostile network; the longest silent one is forgotten
+constexpr double k_peer_silent_s = 10;  ///< the heartbeat comes each second
+constexpr std::size_t k_others = 32;    ///< of a hostile network; the longest silent one is forgotten
 
 bool is_autopilot(const mavlink::Message& m) {
   // MAV_AUTOPILOT_INVALID (8) and MAV_TYPE_GCS (6) are stations, cameras, gimbals.
@@ -70,7 +70,7 @@ std::vector<mavlink::Received> PeerGate::read(mavlink::Framer& framer, const std
 bool PeerGate::may_take(const mavlink::Received& heartbeat, const std::string& sender, double now_s) const {
   if (!is_autopilot(heartbeat.message) || (wanted_ && *wanted_ != sender)) return false;
   if (!peer_) return true;
-  if (now_s - last_seen_s_ <= k_silent_s) return false;
+  if (now_s - last_seen_s_ <= k_peer_silent_s) return false;
   return !armed_ || heartbeat.from == vehicle_;
 }
 

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <utility>
 
+#include "drivers/drone/commands.hpp"
 #include "drivers/drone/session.hpp"
 
 namespace anchord::drone {
@@ -10,8 +11,6 @@ namespace {
 
 using mavlink::Message;
 
-// MAV_CMD of the common set.
-constexpr int k_take_off = 22, k_set_mode = 176, k_reposition = 192, k_arm = 400, k_interval = 511;
 constexpr double k_answers_late_s = 4, k_superseded_s = 3, k_lost_s = 10;
 
 }  // namespace

@@ -1,9 +1,10 @@
 // What belongs to one flight: take-off, targets, speed.
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <utility>
 
+#include "core/base/angle.hpp"
+#include "drivers/drone/commands.hpp"
 #include "drivers/drone/session.hpp"
 
 namespace anchord::drone {
@@ -11,10 +12,7 @@ namespace {
 
 using mavlink::Message;
 
-// MAV_CMD of the common set.
-constexpr int k_take_off = 22, k_speed = 178, k_reposition = 192, k_arm = 400;
-constexpr double k_degree = std::numbers::pi / 180,
-                 k_metres_per_degree = 111'195;  // mean earth radius 6371 km
+constexpr double k_metres_per_degree = 111'195;  // mean earth radius 6371 km
 constexpr double k_reason_s = 0.8;               ///< the autopilot's words may come behind its refusal
 constexpr double k_risen_m = 0.5;                ///< in the air
 constexpr double k_target_again_s = 0.4;

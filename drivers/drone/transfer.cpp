@@ -10,7 +10,7 @@ namespace {
 using mavlink::Message;
 
 constexpr double k_wait_s = 1.5;
-constexpr int k_tries = 5;
+constexpr int k_transfer_tries = 5;
 constexpr std::size_t k_max_items = 1000;
 
 // MAV_CMD and MAV_FRAME of the common set.
@@ -152,7 +152,8 @@ void Session::send_item(std::size_t index) {
 void Session::drive_transfer() {
   if (!transfer_ || now_s_ - transfer_->last_s < k_wait_s) return;
   auto& t = *transfer_;
-  if (t.tries++ >= k_tries) return end_transfer(CommandState::unconfirmed, "the autopilot does not answer");
+  if (t.tries++ >= k_transfer_tries)
+    return end_transfer(CommandState::unconfirmed, "the autopilot does not answer");
   t.last_s = now_s_;
   const auto list = static_cast<std::int64_t>(t.list);
   if (t.up) {

@@ -11,6 +11,8 @@
 
 namespace anchord::pozyx {
 
+inline constexpr std::int64_t k_ms = 1'000'000;  ///< in ns
+
 struct ConversationOptions {
   std::int64_t settle_ns = 250'000'000;    ///< after opening, before the first question
   std::int64_t patience_ns = 200'000'000;  ///< for an answer; the maker's client has 100 ms

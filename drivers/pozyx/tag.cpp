@@ -4,18 +4,12 @@
 #include <cmath>
 
 #include "drivers/pozyx/registers.hpp"
+#include "drivers/pozyx/values.hpp"
 
 namespace anchord::pozyx {
 namespace {
 
-constexpr std::int64_t k_ms = 1'000'000;
-
 std::int64_t ns_of(double seconds) { return static_cast<std::int64_t>(seconds * 1e9); }
-
-std::string id_text(std::uint16_t id) {
-  Bytes big{static_cast<std::uint8_t>(id >> 8), static_cast<std::uint8_t>(id & 0xff)};
-  return "0x" + hex(big);
-}
 
 /// The label under which an error code is counted.
 std::string label_of(std::uint8_t error_code) {
@@ -306,7 +300,7 @@ Script<Result<DeviceInfo>> Tag::stored_position(std::uint16_t id) {
   Bytes parameters;
   put_u16(parameters, id);
   Result<Bytes> data = co_await wire_.call(fn::device_get_coords, parameters, 12);
-  if (!data) co_return make_error(data.error().code, id_text(id) + ": " + data.error().message);
+  if (!data) co_return make_error(data.error().code, to_string(NetworkId{id}) + ": " + data.error().message);
   co_return DeviceInfo{id, true, coordinates_m(data.value())};
 }
 

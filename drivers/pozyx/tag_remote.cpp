@@ -3,18 +3,13 @@
 
 #include "drivers/pozyx/registers.hpp"
 #include "drivers/pozyx/tag.hpp"
+#include "drivers/pozyx/values.hpp"
 
 namespace anchord::pozyx {
 namespace {
 
-constexpr std::int64_t k_ms = 1'000'000;
 constexpr std::int64_t k_remote_ns = 1'000 * k_ms;  ///< the maker's patience for an acknowledgement
 constexpr int k_remote_tries = 3;                   ///< frames are lost; the calls here may be repeated
-
-std::string id_text(std::uint16_t id) {
-  const Bytes big{static_cast<std::uint8_t>(id >> 8), static_cast<std::uint8_t>(id & 0xff)};
-  return "0x" + hex(big);
-}
 
 bool near_mm(const Eigen::Vector3d& a_m, const Eigen::Vector3d& b_m) {
   return (a_m - b_m).cwiseAbs().maxCoeff() <= 0.000501;  // written to the nearest millimetre
@@ -41,7 +36,7 @@ Script<Result<void>> Tag::transmit(std::uint16_t id, std::uint8_t operation, Byt
   if (!events) co_return events.error();
   if (events.value() == 0 || (events.value() & event::err)) {
     const std::string why = co_await failure_of(events.value());
-    co_return make_error(Errc::not_found, id_text(id) + " does not answer: " + why);
+    co_return make_error(Errc::not_found, to_string(NetworkId{id}) + " does not answer: " + why);
   }
   co_return boost::outcome_v2::success();
 }
@@ -52,8 +47,9 @@ Script<Result<Bytes>> Tag::receive(std::uint16_t id, std::size_t n) {
   // Else the buffer holds somebody else's message.
   if (u16_at(header.value(), 0) != id || header.value()[2] != n) {
     co_return make_error(Errc::bad_frame, "a message of " + std::to_string(header.value()[2]) +
-                                              " bytes from " + id_text(u16_at(header.value(), 0)) + ", not " +
-                                              std::to_string(n) + " from " + id_text(id));
+                                              " bytes from " +
+                                              to_string(NetworkId{u16_at(header.value(), 0)}) + ", not " +
+                                              std::to_string(n) + " from " + to_string(NetworkId{id}));
   }
   Bytes parameters{0, static_cast<std::uint8_t>(n)};
   Result<Bytes> data = co_await wire_.call(fn::rx_data, parameters, n);
@@ -98,7 +94,7 @@ Script<Result<Bytes>> Tag::remote_call(std::uint16_t id, std::uint8_t function, 
   if (!sent) co_return sent.error();
   Result<Bytes> data = co_await receive(id, result_bytes + 1);
   if (!data) co_return data.error();
-  if (data.value().front() != 1) co_return make_error(Errc::conflict, id_text(id) + " refuses");
+  if (data.value().front() != 1) co_return make_error(Errc::conflict, to_string(NetworkId{id}) + " refuses");
   data.value().erase(data.value().begin());
   co_return data;
 }

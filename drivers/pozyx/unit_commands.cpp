@@ -11,7 +11,7 @@ namespace {
 
 using Json = nlohmann::json;
 
-Error bad(std::string_view option, std::string_view why) {
+Error bad_option(std::string_view option, std::string_view why) {
   return make_error(Errc::invalid_argument, std::string(option) + ": " + std::string(why));
 }
 
@@ -22,37 +22,39 @@ Json object_of(std::string_view text) {
 
 Result<std::uint16_t> id_of(std::string_view option, const Json& value) {
   const auto id = value.is_string() ? parse_network_id(value.get_ref<const std::string&>())
-                                    : Result<NetworkId>(bad(option, "must be text"));
+                                    : Result<NetworkId>(bad_option(option, "must be text"));
   if (!id || id.value().value == 0 || id.value().value > 0xffff)
-    return bad(option, "must be a network id like \"0x6a21\"");
+    return bad_option(option, "must be a network id like \"0x6a21\"");
   return static_cast<std::uint16_t>(id.value().value);
 }
 
 Result<double> number_of(std::string_view option, const Json& value, double min, double max) {
   if (!value.is_number() || !(value.get<double>() >= min) || !(value.get<double>() <= max))
-    return bad(option, "must be a number");
+    return bad_option(option, "must be a number");
   return value.get<double>();
 }
 
 Result<UwbSettings> uwb_of(const Json& value, UwbSettings settings) {
-  if (!value.is_object()) return bad("uwb", "must be an object");
+  if (!value.is_object()) return bad_option("uwb", "must be an object");
   for (const auto& [key, v] : value.items()) {
     if (key == "all" || key == "devices") continue;
     BOOST_OUTCOME_TRY(const double number, number_of(key, v, 0, 10'000));
     if (key == "channel") {
       settings.channel = static_cast<std::uint8_t>(std::min(number, 255.0));
     } else if (key == "rate_kbps") {
-      if (number != 110 && number != 850 && number != 6810) return bad(key, "must be 110, 850 or 6810");
+      if (number != 110 && number != 850 && number != 6810)
+        return bad_option(key, "must be 110, 850 or 6810");
       settings.rate = static_cast<std::uint8_t>(number == 110 ? 0 : number == 850 ? 1 : 2);
     } else if (key == "prf_mhz") {
-      if (number != 16 && number != 64) return bad(key, "must be 16 or 64");
+      if (number != 16 && number != 64) return bad_option(key, "must be 16 or 64");
       settings.prf = number == 16 ? Prf::mhz16 : Prf::mhz64;
     } else if (key == "preamble_symbols") {
       settings.preamble_symbols = static_cast<int>(number);
     } else if (key == "gain_db") {
       settings.gain_db = number;
     } else {
-      return bad(key, "no such setting: uwb has channel, rate_kbps, prf_mhz, preamble_symbols, gain_db");
+      return bad_option(key,
+                        "no such setting: uwb has channel, rate_kbps, prf_mhz, preamble_symbols, gain_db");
     }
   }
   BOOST_OUTCOME_TRY(uwb_registers(settings));
@@ -123,7 +125,7 @@ std::string light_text(std::uint16_t id) {
 }
 
 Result<std::vector<std::uint16_t>> ids_of(std::string_view option, const Json& value) {
-  if (!value.is_array() || value.size() > 1000) return bad(option, "must be a list of network ids");
+  if (!value.is_array() || value.size() > 1000) return bad_option(option, "must be a list of network ids");
   std::vector<std::uint16_t> out;
   for (const Json& one : value) {
     BOOST_OUTCOME_TRY(const std::uint16_t id, id_of(option, one));
@@ -139,18 +141,19 @@ Result<UnitOptions> unit_options(const Json& json) {
       BOOST_OUTCOME_TRY(out.anchors, ids_of(key, value));
     } else if (key == "cir") {
       if (value != "none" && value != "window" && value != "whole")
-        return bad(key, "must be none, window or whole");
+        return bad_option(key, "must be none, window or whole");
       out.cir = value == "none" ? CirRead::none : value == "window" ? CirRead::window : CirRead::whole;
     } else if (key == "uwb") {
       BOOST_OUTCOME_TRY(const UwbSettings settings, uwb_of(value, {}));
       out.uwb = settings;
     } else if (key == "heading") {
-      if (!value.is_boolean()) return bad(key, "must be true or false");
+      if (!value.is_boolean()) return bad_option(key, "must be true or false");
       out.heading = value.get<bool>();
     } else if (key == "anchor_anchor_s") {
       BOOST_OUTCOME_TRY(out.anchor_anchor_s, number_of(key, value, 0, 86'400));
     } else {
-      return bad(key, "no such option: a pozyx device has anchors, cir, uwb, heading, anchor_anchor_s");
+      return bad_option(key,
+                        "no such option: a pozyx device has anchors, cir, uwb, heading, anchor_anchor_s");
     }
   }
   return out;
@@ -163,16 +166,16 @@ struct Push {
 Result<Push> push_of(const Json& json) {
   Push out;
   if (!json.is_object() || !json.contains("positions") || !json["positions"].is_array())
-    return bad("positions", "must be a list of {network_id, x_m, y_m, z_m}");
+    return bad_option("positions", "must be a list of {network_id, x_m, y_m, z_m}");
   out.save = json.value("save", Json(false)) == Json(true);
   for (const Json& one : json["positions"]) {
     if (!one.is_object() || !one.contains("network_id"))
-      return bad("positions", "each item needs its network_id");
+      return bad_option("positions", "each item needs its network_id");
     BOOST_OUTCOME_TRY(const std::uint16_t id, id_of("network_id", one["network_id"]));
     DeviceInfo device{id, true, {}};
     int axis = 0;
     for (const char* key : {"x_m", "y_m", "z_m"}) {
-      if (!one.contains(key)) return bad(key, "is required");
+      if (!one.contains(key)) return bad_option(key, "is required");
       BOOST_OUTCOME_TRY(device.local_m[axis++], number_of(key, one[key], -2e6, 2e6));
     }
     out.devices.push_back(device);
@@ -185,7 +188,7 @@ Result<Push> push_of(const Json& json) {
 Result<std::unique_ptr<device::Driver>> make_unit(std::string_view options_json,
                                                   device::DriverOutput& output) {
   const Json json = object_of(options_json);
-  if (!json.is_object()) return bad("options", "must be a JSON object");
+  if (!json.is_object()) return bad_option("options", "must be a JSON object");
   BOOST_OUTCOME_TRY(UnitOptions options, unit_options(json));
   return std::unique_ptr<device::Driver>(std::make_unique<Unit>(std::move(options), output));
 }
@@ -314,7 +317,7 @@ Script<Result<std::string>> Unit::push_positions(std::string arguments) {
 Script<Result<std::string>> Unit::range_between(std::string arguments) {
   const Json json = object_of(arguments);
   if (!json.is_object() || !json.contains("from") || !json.contains("to"))
-    co_return bad("from, to", "both are required");
+    co_return bad_option("from, to", "both are required");
   const Result<std::uint16_t> from = id_of("from", json["from"]), to = id_of("to", json["to"]);
   if (!from) co_return from.error();
   if (!to) co_return to.error();

@@ -5,10 +5,10 @@
 #include <cmath>
 #include <numbers>
 
+#include "core/base/angle.hpp"
+
 namespace anchord::sim {
 namespace {
-
-constexpr double k_degree = std::numbers::pi / 180.0;
 
 /// Smallest angle between two directions, 0..pi.
 double apart_rad(double a, double b) { return std::abs(std::remainder(a - b, 2.0 * std::numbers::pi)); }

@@ -40,7 +40,7 @@ void sum(std::string& frame, std::size_t from) {
 double horizontal_m(const RoverEpoch& epoch) {
   return std::hypot(epoch.sigma_enu_m.x(), epoch.sigma_enu_m.y());
 }
-double course_deg(const RoverEpoch& epoch) {
+double signed_course_deg(const RoverEpoch& epoch) {
   return std::atan2(epoch.velocity_enu_mps.x(), epoch.velocity_enu_mps.y()) * 180 / std::numbers::pi;
 }
 bool located(const RoverEpoch& epoch) { return epoch.fix != FixClass::none; }
@@ -75,7 +75,7 @@ std::string nav_pvt(const RoverEpoch& epoch) {
   put<std::int32_t>(m, scaled(v.x(), 1e-3));
   put<std::int32_t>(m, scaled(-v.z(), 1e-3));
   put<std::int32_t>(m, scaled(v.head<2>().norm(), 1e-3));
-  put<std::int32_t>(m, scaled(std::fmod(course_deg(epoch) + 360, 360), 1e-5));
+  put<std::int32_t>(m, scaled(std::fmod(signed_course_deg(epoch) + 360, 360), 1e-5));
   put<std::uint32_t>(m, 50);
   put<std::uint32_t>(m, 180'000);
   put<std::uint16_t>(m, 170);
@@ -177,7 +177,7 @@ std::string encode_erb(const RoverEpoch& epoch) {
   const Eigen::Vector3d& v = epoch.velocity_enu_mps;
   for (const double speed : {v.y(), v.x(), -v.z()}) put<std::int32_t>(vel, scaled(speed, 0.01));
   put<std::uint32_t>(vel, count(v.head<2>().norm(), 0.01));
-  put<std::int32_t>(vel, scaled(course_deg(epoch), 1e-5));
+  put<std::int32_t>(vel, scaled(signed_course_deg(epoch), 1e-5));
   put<std::uint32_t>(vel, 0);
   svi += '\0';
   rtk += static_cast<char>(epoch.satellites);

@@ -6,6 +6,7 @@
 #include "core/base/to_wire.hpp"
 #include "server/cli/commands.hpp"
 #include "server/cli/config_flags.hpp"
+#include "server/cli/failed.hpp"
 #include "server/cli/progress.hpp"
 #include "server/cli/rest_json.hpp"
 #include "server/cli/server_address.hpp"
@@ -16,7 +17,7 @@
 namespace anchord::cli {
 namespace {
 
-struct Options {
+struct BackupOptions {
   std::string data_dir{"anchord-data"}, database, dir, file;
   std::size_t keep{7};
   bool without_cirs{false};
@@ -24,11 +25,6 @@ struct Options {
     return dir.empty() ? std::filesystem::path(data_dir) / "backups" : std::filesystem::path(dir);
   }
 };
-
-int fail(const std::string& message, int code = 1) {
-  std::fprintf(stderr, "anchord: %s\n", printable(message).c_str());
-  return code;
-}
 
 /// 0; where files of impulse responses are missing from it, 1 and which.
 int report_missing(const std::string& backup, const std::vector<std::string>& missing) {
@@ -55,39 +51,41 @@ Result<nlohmann::json> made_by(RestClient& client) {
 }
 
 /// A running server owns the folder and makes the copy itself; none when nobody answers.
-std::optional<int> through_server(const Options& options) {
+std::optional<int> through_server(const BackupOptions& options) {
   const auto url = running_server(options.data_dir);
   if (!url) return std::nullopt;
   auto client = RestClient::make(*url, own_token(options.data_dir), interrupted);
   if (!client || !client.value()->get("/healthz")) return std::nullopt;  // an address left by a crash
   if (!options.dir.empty())
-    return fail("a running server uses this folder and stores its backups in its backup.dir; omit --dir", 2);
+    return failed("anchord",
+                  "a running server uses this folder and stores its backups in its backup.dir; omit --dir",
+                  2);
   const auto made = made_by(*client.value());
-  if (!made) return fail(made.error().message);
+  if (!made) return failed("anchord", made.error().message);
   std::printf("%s\n", to_wire(made.value()).c_str());
   return report_missing(made.value().value("name", ""),
                         made.value().value("cir_missing", std::vector<std::string>{}));
 }
 
 /// Whether the rows are where no command of this file reaches.
-bool elsewhere(const Options& options) {
+bool elsewhere(const BackupOptions& options) {
   return !options.database.empty() || !sql::postgres_of_folder(options.data_dir).empty();
 }
 
-int make(const Options& options) {
-  if (elsewhere(options)) return fail(k_postgres_backups, 2);
+int make(const BackupOptions& options) {
+  if (elsewhere(options)) return failed("anchord", k_postgres_backups, 2);
   if (const auto code = through_server(options)) return *code;
   StorageOptions storage;
   storage.data_dir = options.data_dir;
   if (!std::filesystem::exists(storage.data_dir / "anchord.db"))
-    return fail("there is no database in " + options.data_dir, 2);
+    return failed("anchord", "there is no database in " + options.data_dir, 2);
   auto database = open_database(storage);
-  if (!database) return fail(database.error().message);
+  if (!database) return failed("anchord", database.error().message);
   const SystemClock clock;
   server::BackupKeeper keeper(*database.value(), clock, {options.folder(), options.keep, 24, false});
   (void)interrupted();  // from here on a signal is asked for
   const auto made = keeper.make([] { return !interrupted(); });
-  if (!made) return fail(made.error().message);
+  if (!made) return failed("anchord", made.error().message);
   std::printf("%s  %llu bytes  sha256 %s\n", (options.folder() / made.value().name).c_str(),
               static_cast<unsigned long long>(made.value().bytes), made.value().sha256_hex.c_str());
   print_cirs(made.value().cir_files, made.value().cir_bytes);
@@ -95,25 +93,25 @@ int make(const Options& options) {
 }
 
 /// Input that cannot be used, or something that failed.
-int fail(const Error& error) {
+int failed_by(const Error& error) {
   const bool input = error.code == Errc::not_found || error.code == Errc::unsupported;
-  return fail(error.message, input ? 2 : 1);
+  return failed("anchord", error.message, input ? 2 : 1);
 }
 
-int check(const Options& options) {
-  if (const auto whole = check_backup(options.file); !whole) return fail(whole.error());
+int check(const BackupOptions& options) {
+  if (const auto whole = check_backup(options.file); !whole) return failed_by(whole.error());
   const auto cirs = check_backup_cirs(options.file);
-  if (!cirs) return fail(cirs.error());
+  if (!cirs) return failed_by(cirs.error());
   if (!cirs.value().missing.empty()) return report_missing(options.file, cirs.value().missing);
   std::printf("%s is complete\n", options.file.c_str());
   print_cirs(cirs.value().files, cirs.value().bytes);
   return 0;
 }
 
-int restore(const Options& options) {
-  if (elsewhere(options)) return fail(k_postgres_backups, 2);
+int restore(const BackupOptions& options) {
+  if (elsewhere(options)) return failed("anchord", k_postgres_backups, 2);
   const auto restored = restore_backup(options.data_dir, options.file, options.without_cirs);
-  if (!restored) return fail(restored.error());
+  if (!restored) return failed_by(restored.error());
   std::printf("%s is now the database of %s\n", options.file.c_str(), options.data_dir.c_str());
   if (restored.value().old)
     std::printf("the previous database is kept as %s\n", restored.value().old->c_str());
@@ -130,7 +128,7 @@ void add_backup_command(CLI::App& app, int& exit_code) {
       "Copy the database and its files of impulse responses while they are in use, check or restore "
       "a copy");
   command->require_subcommand(0, 1);
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<BackupOptions>();
   const auto common = [&](CLI::App* sub) {
     sub->add_option("--data-dir", options->data_dir, "folder of the database [anchord-data]")
         ->envname("ANCHORD_DATA_DIR");

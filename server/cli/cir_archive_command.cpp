@@ -6,6 +6,7 @@
 #include "core/base/text.hpp"
 #include "core/base/to_wire.hpp"
 #include "server/cli/commands.hpp"
+#include "server/cli/failed.hpp"
 #include "server/cli/progress.hpp"
 #include "server/cli/rest_json.hpp"
 #include "server/cli/server_address.hpp"
@@ -16,17 +17,12 @@ namespace {
 
 using Json = nlohmann::json;
 
-struct Options {
+struct CirArchiveOptions {
   std::string data_dir{"anchord-data"}, url, mission, to{"file"};
   bool json{false};
 };
 
-int fail(const std::string& message) {
-  std::fprintf(stderr, "anchord cir-archive: %s\n", printable(message).c_str());
-  return 1;
-}
-
-Result<std::unique_ptr<RestClient>> server_of(const Options& options) {
+Result<std::unique_ptr<RestClient>> server_of(const CirArchiveOptions& options) {
   const auto url = options.url.empty() ? running_server(options.data_dir) : std::optional(options.url);
   if (!url)
     return make_error(Errc::not_found, "no server is running on the data folder " + options.data_dir +
@@ -60,7 +56,7 @@ void print(const Json& items) {
     std::printf("%s\n", line.c_str());
 }
 
-int show(const Options& options, const Json& items) {
+int show(const CirArchiveOptions& options, const Json& items) {
   if (options.json)
     std::printf("%s\n", to_wire(items, 1).c_str());
   else if (items.empty())
@@ -70,14 +66,14 @@ int show(const Options& options, const Json& items) {
   return 0;
 }
 
-int list(const Options& options) {
+int list(const CirArchiveOptions& options) {
   auto client = server_of(options);
-  if (!client) return fail(client.error().message);
+  if (!client) return failed("anchord cir-archive", client.error().message);
   const auto items = archived(*client.value());
-  return items ? show(options, items.value()) : fail(items.error().message);
+  return items ? show(options, items.value()) : failed("anchord cir-archive", items.error().message);
 }
 
-Result<Json> moved(const Options& options) {
+Result<Json> moved(const CirArchiveOptions& options) {
   BOOST_OUTCOME_TRY(auto client, server_of(options));
   BOOST_OUTCOME_TRY(const auto job, post_json(*client, "/api/v1/missions/" + options.mission + "/cir-archive",
                                               {{"to", options.to}}));
@@ -89,9 +85,9 @@ Result<Json> moved(const Options& options) {
   return out;
 }
 
-int move(const Options& options) {
+int move(const CirArchiveOptions& options) {
   const auto items = moved(options);
-  return items ? show(options, items.value()) : fail(items.error().message);
+  return items ? show(options, items.value()) : failed("anchord cir-archive", items.error().message);
 }
 
 }  // namespace
@@ -101,7 +97,7 @@ void add_cir_archive_command(CLI::App& app, int& exit_code) {
       app.add_subcommand("cir-archive",
                          "List flights whose impulse responses are in files, and move them between "
                          "database and file, on a running server");
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<CirArchiveOptions>();
   command->add_option("--data-dir", options->data_dir, "Data folder of the server")
       ->capture_default_str()
       ->envname("ANCHORD_DATA_DIR");

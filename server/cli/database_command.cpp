@@ -4,22 +4,22 @@
 
 #include "core/base/text.hpp"
 #include "server/cli/commands.hpp"
+#include "server/cli/failed.hpp"
 #include "server/cli/progress.hpp"
 #include "server/storage/database_copy.hpp"
 
 namespace anchord::cli {
 namespace {
 
-struct Options {
+struct DatabaseOptions {
   std::string from, to;
   CopyFolders folders;
 };
 
-int fail(const Error& error) {
-  std::fprintf(stderr, "anchord: %s\n", printable(error.message).c_str());
+int failed_by_database(const Error& error) {
   const bool input = error.code == Errc::invalid_argument || error.code == Errc::not_found ||
                      error.code == Errc::unsupported;
-  return input ? 2 : 1;
+  return failed("anchord", error.message, input ? 2 : 1);
 }
 
 void print(const sql::TableDigest& table) {
@@ -27,22 +27,22 @@ void print(const sql::TableDigest& table) {
               table.sha256_hex.c_str());
 }
 
-int migrate(const Options& options) {
+int migrate(const DatabaseOptions& options) {
   const auto version = migrate_database(options.from);
-  if (!version) return fail(version.error());
+  if (!version) return failed_by_database(version.error());
   std::printf("version %d\n", version.value());
   return 0;
 }
 
-int check(const Options& options) {
+int check_databases(const DatabaseOptions& options) {
   const auto here = digest_database(options.from);
-  if (!here) return fail(here.error());
+  if (!here) return failed_by_database(here.error());
   if (options.to.empty()) {
     for (const auto& table : here.value()) print(table);
     return 0;
   }
   const auto there = digest_database(options.to);
-  if (!there) return fail(there.error());
+  if (!there) return failed_by_database(there.error());
   int differ = 0;
   for (std::size_t i = 0; i < here.value().size(); ++i) {
     const auto& one = here.value()[i];
@@ -56,7 +56,7 @@ int check(const Options& options) {
   return differ == 0 ? 0 : 1;
 }
 
-int copy(const Options& options) {
+int copy(const DatabaseOptions& options) {
   (void)interrupted();
   std::string told;
   const auto done =
@@ -65,7 +65,7 @@ int copy(const Options& options) {
         told = table;
         return !interrupted();
       });
-  if (!done) return fail(done.error());
+  if (!done) return failed_by_database(done.error());
   for (const auto& table : done.value().tables) print(table);
   const CirCopies& cirs = done.value().cirs;
   if (cirs.files > 0)
@@ -82,7 +82,7 @@ void add_database_command(CLI::App& app, int& exit_code) {
   auto* command = app.add_subcommand(
       "database", "Migrate, compare and copy whole databases: SQLite folders and PostgreSQL");
   command->require_subcommand(1);
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<DatabaseOptions>();
   const char* place = "data folder, or postgresql://user@host/name";
   auto* migrated = command->add_subcommand("migrate", "Migrate a database to the newest version");
   migrated->add_option("database", options->from, place)->required();
@@ -91,7 +91,7 @@ void add_database_command(CLI::App& app, int& exit_code) {
       command->add_subcommand("check", "Print rows and digest of each table, or compare two databases");
   checked->add_option("database", options->from, place)->required();
   checked->add_option("other", options->to, "database to compare with");
-  checked->callback([&exit_code, options] { exit_code = check(*options); });
+  checked->callback([&exit_code, options] { exit_code = check_databases(*options); });
   auto* copied = command->add_subcommand(
       "copy",
       "Copy all rows and their files of impulse responses into an empty database and compare; the same "

@@ -8,6 +8,7 @@
 #include "core/base/text.hpp"
 #include "core/base/to_wire.hpp"
 #include "server/cli/commands.hpp"
+#include "server/cli/failed.hpp"
 #include "server/cli/server_address.hpp"
 #include "server/config/toml_json.hpp"
 #include "server/http/http_client.hpp"
@@ -17,21 +18,16 @@ namespace {
 
 using Ordered = nlohmann::ordered_json;
 
-struct Options {
+struct DevicesOptions {
   std::string data_dir{"anchord-data"}, url, device, kind, address, name, action, arguments, anchor;
   std::vector<std::string> settings;
   bool json{false};
 };
 
-int fail(const std::string& message, int code = 1) {
-  std::fprintf(stderr, "anchord devices: %s\n", printable(message).c_str());
-  return code;
-}
-
 /// The running server, asked with the token of its own folder.
 class Server {
  public:
-  static Result<Server> of(const Options& options) {
+  static Result<Server> of(const DevicesOptions& options) {
     const auto url = options.url.empty() ? running_server(options.data_dir) : std::optional(options.url);
     if (!url) {
       return make_error(Errc::not_found, "no server is running on the data folder " + options.data_dir +
@@ -102,9 +98,9 @@ void print_device(const Ordered& d) {
   if (n > 0) std::printf("    not used: %s\n", to_wire(dropped).c_str());
 }
 
-int show(const Options& options, const Result<Ordered>& list, const char* none,
+int show(const DevicesOptions& options, const Result<Ordered>& list, const char* none,
          void (*print)(const Ordered&)) {
-  if (!list) return fail(list.error().message);
+  if (!list) return failed("anchord devices", list.error().message);
   if (options.json) {
     std::printf("%s\n", to_wire(list.value(), 1).c_str());
     return 0;
@@ -114,17 +110,17 @@ int show(const Options& options, const Result<Ordered>& list, const char* none,
   return 0;
 }
 
-int list(const Options& options, Server& server) {
+int list(const DevicesOptions& options, Server& server) {
   return show(options, configured(server),
               "no device is set up: run anchord devices discover, then anchord devices add", print_device);
 }
 
-int discover(const Options& options, Server& server) {
+int discover(const DevicesOptions& options, Server& server) {
   server.header("Prefer", "wait=20");
   auto found = server.call("POST", "/api/v1/discovery", "{}");
-  if (!found) return fail(found.error().message);
+  if (!found) return failed("anchord devices", found.error().message);
   if (!found.value().contains("items"))
-    return fail("the discovery takes longer than 20 s: run the command again");
+    return failed("anchord devices", "the discovery takes longer than 20 s: run the command again");
   const char* none = "no unused serial port was found; a network device is added by its address";
   return show(options, found.value()["items"], none, [](const Ordered& d) {
     const auto kind = text(d, "kind");
@@ -173,54 +169,55 @@ Result<Ordered> patch_of(const std::vector<std::string>& settings) {
   return out;
 }
 
-int add(const Options& options, Server& server) {
+int add(const DevicesOptions& options, Server& server) {
   auto body = patch_of(options.settings);
-  if (!body) return fail(body.error().message, 2);
+  if (!body) return failed("anchord devices", body.error().message, 2);
   body.value()["kind"] = options.kind;
   body.value()["address"] = options.address;
   body.value()["name"] = options.name.empty() ? options.kind : options.name;
   const auto made = server.call("POST", "/api/v1/devices", to_wire(body.value()));
-  if (!made) return fail(made.error().message);
+  if (!made) return failed("anchord devices", made.error().message);
   std::printf("%s\n", text(made.value(), "id").c_str());
   return 0;
 }
 
-int settings(const Options& options, Server& server) {
+int settings(const DevicesOptions& options, Server& server) {
   const auto device = find(server, options.device);
-  if (!device) return fail(device.error().message);
+  if (!device) return failed("anchord devices", device.error().message);
   if (options.settings.empty()) {
     std::printf("%s\n", to_wire(device.value(), 1).c_str());
     return 0;
   }
   const auto patch = patch_of(options.settings);
-  if (!patch) return fail(patch.error().message, 2);
+  if (!patch) return failed("anchord devices", patch.error().message, 2);
   server.header("If-Match", "*");
   const auto changed =
       server.call("PATCH", "/api/v1/devices/" + text(device.value(), "id"), to_wire(patch.value()));
-  if (!changed) return fail(changed.error().message);
+  if (!changed) return failed("anchord devices", changed.error().message);
   print_device(changed.value());
   return 0;
 }
 
-int remove(const Options& options, Server& server) {
+int remove(const DevicesOptions& options, Server& server) {
   const auto device = find(server, options.device);
-  if (!device) return fail(device.error().message);
+  if (!device) return failed("anchord devices", device.error().message);
   server.header("If-Match", "*");
   const auto done = server.call("DELETE", "/api/v1/devices/" + text(device.value(), "id"));
-  return done ? 0 : fail(done.error().message);
+  return done ? 0 : failed("anchord devices", done.error().message);
 }
 
-int act(const Options& options, Server& server) {
+int act(const DevicesOptions& options, Server& server) {
   const auto device = find(server, options.device);
-  if (!device) return fail(device.error().message);
+  if (!device) return failed("anchord devices", device.error().message);
   Ordered body{{"action", options.action}};
   if (!options.arguments.empty()) {
     body["arguments"] = Ordered::parse(options.arguments, nullptr, false);
-    if (!body["arguments"].is_object()) return fail("--arguments must be a JSON object", 2);
+    if (!body["arguments"].is_object())
+      return failed("anchord devices", "--arguments must be a JSON object", 2);
   }
   const auto done =
       server.call("POST", "/api/v1/devices/" + text(device.value(), "id") + "/actions", to_wire(body));
-  if (!done) return fail(done.error().message);
+  if (!done) return failed("anchord devices", done.error().message);
   std::printf("%s\n", to_wire(done.value().value("result", Ordered()), 1).c_str());
   return 0;
 }
@@ -229,7 +226,7 @@ int act(const Options& options, Server& server) {
 
 void add_devices_command(CLI::App& app, int& exit_code) {
   auto* command = app.add_subcommand("devices", "Tags, rovers and correction services of a running server");
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<DevicesOptions>();
   command->add_option("--data-dir", options->data_dir, "Data folder of the server")
       ->capture_default_str()
       ->envname("ANCHORD_DATA_DIR");
@@ -237,9 +234,9 @@ void add_devices_command(CLI::App& app, int& exit_code) {
   command->add_flag("--json", options->json, "Print JSON as the server sends it");
   command->require_subcommand(0, 1);
   command->fallthrough();
-  const auto run = [options, &exit_code](int (*what)(const Options&, Server&)) {
+  const auto run = [options, &exit_code](int (*what)(const DevicesOptions&, Server&)) {
     auto server = Server::of(*options);
-    exit_code = server ? what(*options, server.value()) : fail(server.error().message);
+    exit_code = server ? what(*options, server.value()) : failed("anchord devices", server.error().message);
   };
   command->add_subcommand("list", "Configured devices and their state")->callback([run] { run(list); });
   command->add_subcommand("discover", "Listen on every port that is not in use")->callback([run] {

@@ -8,6 +8,7 @@
 
 #include "core/base/text.hpp"
 #include "server/cli/commands.hpp"
+#include "server/cli/failed.hpp"
 #include "server/cli/server_address.hpp"
 #include "server/cli/signals.hpp"
 #include "server/gateway/gateway.hpp"
@@ -20,25 +21,21 @@ namespace {
 
 using Json = nlohmann::json;
 
-struct Options {
+struct GatewayOptions {
   gateway::GatewayOptions gateway;
   std::string token_file, data_dir{"anchord-gateway"}, mission, log_level{"info"};
   std::uint64_t max_mib{4096}, recordings_max_mib{8192};
   bool json{false};
 };
 
-int fail(const std::string& message, int code) {
-  std::fprintf(stderr, "anchord gateway: %s\n", printable(message).c_str());
-  return code;
-}
-
-int run(Options& options) {
+int run_gateway(GatewayOptions& options) {
   auto& g = options.gateway;
   if (g.to.empty())
-    return fail("--to is missing: the address of the server, like http://192.168.1.10:8420", 2);
+    return failed("anchord gateway",
+                  "--to is missing: the address of the server, like http://192.168.1.10:8420", 2);
   if (!options.mission.empty()) {
     const auto id = parse_uuid(options.mission);
-    if (!id) return fail("--mission: " + id.error().message, 2);
+    if (!id) return failed("anchord gateway", "--mission: " + id.error().message, 2);
     g.mission = MissionId{id.value()};
   }
   g.token_file = options.token_file;
@@ -50,7 +47,9 @@ int run(Options& options) {
   umask(077);
   server::start_logging(options.log_level);
   auto started = gateway::FieldGateway::start(g);
-  if (!started) return fail(started.error().message, started.error().code == Errc::invalid_argument ? 2 : 1);
+  if (!started)
+    return failed("anchord gateway", started.error().message,
+                  started.error().code == Errc::invalid_argument ? 2 : 1);
   (void)server::notify_service_manager("READY=1");
   (void)wait_for_signal({SIGTERM, SIGINT});
   (void)server::notify_service_manager("STOPPING=1");
@@ -104,19 +103,20 @@ void print_status(const Json& s) {
     line("ALARM", text(a, "code") + ": " + text(a, "text"));
 }
 
-int status(const Options& options) {
+int status(const GatewayOptions& options) {
   const auto url = running_server(options.data_dir);
   if (!url)
-    return fail("no gateway is running on the data folder " + options.data_dir +
-                    ": start 'anchord gateway --to URL', or give its --data-dir",
-                1);
+    return failed("anchord gateway",
+                  "no gateway is running on the data folder " + options.data_dir +
+                      ": start 'anchord gateway --to URL', or give its --data-dir",
+                  1);
   auto client = server::HttpClient::to(*url, std::chrono::seconds(5));
-  if (!client) return fail(client.error().message, 1);
+  if (!client) return failed("anchord gateway", client.error().message, 1);
   const auto answer = client.value().call("GET", "/status");
-  if (!answer) return fail(answer.error().message, 1);
+  if (!answer) return failed("anchord gateway", answer.error().message, 1);
   const auto json = Json::parse(answer.value().body, nullptr, false);
   if (answer.value().status != 200 || !json.is_object() || !json.contains("outbox"))
-    return fail(*url + " is not a gateway: give the --data-dir of the gateway", 1);
+    return failed("anchord gateway", *url + " is not a gateway: give the --data-dir of the gateway", 1);
   if (options.json)
     std::printf("%s\n", answer.value().body.c_str());
   else
@@ -130,7 +130,7 @@ void add_gateway_command(CLI::App& app, int& exit_code) {
   auto* command = app.add_subcommand(
       "gateway",
       "Record devices on an aircraft's computer or a field laptop and send their rows to a server");
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<GatewayOptions>();
   auto& o = *options;
   command->add_option("--to", o.gateway.to, "address of the server, like http://192.168.1.10:8420")
       ->envname("ANCHORD_GATEWAY_TO");
@@ -170,7 +170,7 @@ void add_gateway_command(CLI::App& app, int& exit_code) {
   shown->add_flag("--json", o.json, "print JSON as the gateway sends it");
   shown->callback([&exit_code, options] { exit_code = status(*options); });
   command->callback([&exit_code, options, command] {
-    if (command->get_subcommands().empty()) exit_code = run(*options);
+    if (command->get_subcommands().empty()) exit_code = run_gateway(*options);
   });
 }
 

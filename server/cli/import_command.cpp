@@ -20,18 +20,18 @@
 namespace anchord::cli {
 namespace {
 
-struct Options {
+struct ImportOptions {
   std::string folder, url, data_dir, database, token_file, name;
   ForeignSource foreign;
 };
 
-std::string name_of(const Options& options, const FlightData& flight) {
+std::string name_of(const ImportOptions& options, const FlightData& flight) {
   if (!options.name.empty()) return options.name;
   if (!flight.mission.name.empty()) return flight.mission.name;
   return std::filesystem::weakly_canonical(options.folder).filename().string();
 }
 
-Result<std::string> import_by_rest(const Options& options, FlightData flight) {
+Result<std::string> import_by_rest(const ImportOptions& options, FlightData flight) {
   BOOST_OUTCOME_TRY(const auto token, read_token_file(options.token_file));
   BOOST_OUTCOME_TRY(const auto client, RestClient::make(options.url, token, interrupted));
   const std::string name = name_of(options, flight);
@@ -75,7 +75,7 @@ Result<void> append_all(std::vector<Row>& rows, const MissionId& mission, std::s
   return boost::outcome_v2::success();
 }
 
-Result<std::string> import_into_folder(const Options& options, FlightData flight) {
+Result<std::string> import_into_folder(const ImportOptions& options, FlightData flight) {
   StorageOptions storage;
   storage.data_dir = options.data_dir;
   BOOST_OUTCOME_TRY(const auto db, open_store(options.database, storage));
@@ -109,7 +109,7 @@ Result<std::string> import_into_folder(const Options& options, FlightData flight
   return to_string(mission.id);
 }
 
-Result<FlightData> read_flight(const Options& options) {
+Result<FlightData> read_flight(const ImportOptions& options) {
   if (options.folder.empty() == !options.foreign.given())
     return make_error(Errc::invalid_argument, "give either a flight folder, or --track and --ranges");
   if (!options.foreign.given()) return read_flight_folder(options.folder);
@@ -117,7 +117,7 @@ Result<FlightData> read_flight(const Options& options) {
   return flight;
 }
 
-int import_flight(const Options& options) {
+int import_flight(const ImportOptions& options) {
   auto flight = read_flight(options);
   if (!flight) {
     std::fprintf(stderr, "anchord import: %s\n", printable(flight.error().message).c_str());
@@ -142,7 +142,7 @@ void add_import_command(CLI::App& app, int& exit_code) {
   command->require_subcommand(1);
   auto* flight = command->add_subcommand(
       "flight", "Import a flight folder as a finished mission; prints the id of the mission");
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<ImportOptions>();
   options->url = "http://127.0.0.1:8420";
   flight->add_option("folder", options->folder,
                      "Flight folder: flight.json, track.csv[.gz], ranges.csv[.gz]; or --track and --ranges");

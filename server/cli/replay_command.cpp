@@ -23,7 +23,7 @@ namespace {
 using SteadyClock = std::chrono::steady_clock;
 constexpr auto k_tick = std::chrono::milliseconds(100);
 
-struct Options {
+struct ReplayOptions {
   std::string source, url{"http://127.0.0.1:8420"}, speed{"1"}, token_file, name, out, mission;
   bool loop{false}, url_given{false}, speed_given{false};
 };
@@ -69,7 +69,8 @@ Result<void> play(FlightUpload& upload, double speed) {
   return boost::outcome_v2::success();
 }
 
-Result<void> play_once(const Options& options, RestClient& client, const FlightData& flight, double speed) {
+Result<void> play_once(const ReplayOptions& options, RestClient& client, const FlightData& flight,
+                       double speed) {
   FlightUpload upload(client, flight);
   stamp_to_now(upload, speed, SystemClock{}.now());
   BOOST_OUTCOME_TRY(upload.create_mission(options.name.empty() ? flight.mission.name : options.name));
@@ -105,7 +106,7 @@ Result<FlightData> fetch_flight(RestClient& client, const std::string& id) {
   return flight;
 }
 
-int replay(const Options& options) {
+int replay(const ReplayOptions& options) {
   const bool recording = device::is_recording(options.source);
   if (recording && !options.url_given)
     return derive_recording(options.source, options.out.empty() ? "-" : options.out);
@@ -165,7 +166,7 @@ void add_replay_command(CLI::App& app, int& exit_code) {
   auto* command = app.add_subcommand(
       "replay",
       "Replay a flight through a running server as if it were live, or decode a raw recording again");
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<ReplayOptions>();
   command
       ->add_option("flight", options->source,
                    "Flight folder, id of a mission on that server, or raw recording (*.anrec)")

@@ -17,6 +17,7 @@
 #include "core/base/to_wire.hpp"
 #include "core/types/mission.hpp"
 #include "drivers/device/replay.hpp"
+#include "server/cli/failed.hpp"
 #include "server/cli/progress.hpp"
 #include "server/cli/rest_client.hpp"
 #include "server/cli/row_upload.hpp"
@@ -28,12 +29,7 @@ using SteadyClock = std::chrono::steady_clock;
 
 // About a megabyte of rows with impulse responses: what a server takes in one gulp.
 constexpr int k_batch = 500;
-constexpr auto k_tick = std::chrono::milliseconds(100);
-
-int fail(const Error& error, int code) {
-  std::fprintf(stderr, "anchord replay: %s\n", printable(error.message).c_str());
-  return code;
-}
+constexpr auto k_replay_tick = std::chrono::milliseconds(100);
 
 std::string line_of(const Fix& fix) { return to_wire(api::fix_json(fix, std::nullopt)) + '\n'; }
 std::string line_of(const Range& range) { return to_wire(api::range_json(range, std::nullopt)) + '\n'; }
@@ -142,7 +138,7 @@ class Player {
     const auto due = begun_ + std::chrono::duration_cast<SteadyClock::duration>(
                                   std::chrono::duration<double>(seconds_between(*first_, recorded) / speed_));
     while (SteadyClock::now() < due) {
-      const auto next = sent_ + k_tick;
+      const auto next = sent_ + k_replay_tick;
       std::this_thread::sleep_until(std::min(next, due));
       if (SteadyClock::now() >= next) {
         BOOST_OUTCOME_TRYV(send());
@@ -195,7 +191,7 @@ int to_streams(const std::string& file, std::ostream& fixes, std::ostream& range
     if (!((fix ? fixes : ranges) << line_of(row))) return make_error(Errc::storage_full, "cannot write rows");
     return boost::outcome_v2::success();
   });
-  return done ? 0 : fail(done.error(), code_of(done.error()));
+  return done ? 0 : failed("anchord replay", done.error().message, code_of(done.error()));
 }
 
 }  // namespace
@@ -207,7 +203,7 @@ int play_recording(const std::string& file, const RecordingTarget& target, RestC
   auto done = run(file, [&](const auto& row) { return player.take(row); });
   if (done) done = player.finish();
   const bool all = player.report();
-  if (!done) return fail(done.error(), code_of(done.error()));
+  if (!done) return failed("anchord replay", done.error().message, code_of(done.error()));
   return all ? 0 : 1;
 }
 
@@ -216,7 +212,7 @@ int derive_recording(const std::string& file, const std::string& folder) {
   std::error_code error;
   std::filesystem::create_directories(folder, error);
   std::ofstream fixes(folder + "/fixes.ndjson"), ranges(folder + "/ranges.ndjson");
-  if (!fixes || !ranges) return fail(make_error(Errc::storage_unavailable, "cannot write into " + folder), 1);
+  if (!fixes || !ranges) return failed("anchord replay", "cannot write into " + folder);
   const int code = to_streams(file, fixes, ranges);
   fixes.close();
   ranges.close();

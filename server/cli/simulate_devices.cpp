@@ -13,6 +13,7 @@
 #include "core/base/to_wire.hpp"
 #include "drivers/sim/rig.hpp"
 #include "drivers/sim/scenario_file.hpp"
+#include "server/cli/failed.hpp"
 #include "server/cli/progress.hpp"
 
 namespace anchord::cli {
@@ -20,11 +21,6 @@ namespace {
 
 namespace fs = std::filesystem;
 using Ordered = nlohmann::ordered_json;
-
-int fail(const std::string& message, int code) {
-  std::fprintf(stderr, "anchord simulate: %s\n", printable(message).c_str());
-  return code;
-}
 
 Ordered text_or_null(const std::string& text) { return text.empty() ? Ordered(nullptr) : Ordered(text); }
 
@@ -109,7 +105,7 @@ struct Links {
 
 int simulate_devices(const SimulateDevices& options) {
   auto scenario = sim::read_scenario(options.scenario);
-  if (!scenario) return fail(scenario.error().message, 2);
+  if (!scenario) return failed("anchord simulate", scenario.error().message, 2);
   if (options.seed) scenario.value().seed = *options.seed;
   // Absolute, since an address is.
   Links links{options.links.empty() ? fs::path() : fs::absolute(options.links), options.links.empty()};
@@ -118,14 +114,14 @@ int simulate_devices(const SimulateDevices& options) {
     links.folder = fs::temp_directory_path() / ("anchord-simulate-" + std::to_string(::getpid()));
   }
   fs::create_directories(links.folder, error);
-  if (error) return fail(links.folder.string() + ": " + error.message(), 1);
+  if (error) return failed("anchord simulate", links.folder.string() + ": " + error.message(), 1);
   const auto shared = std::make_shared<const sim::Scenario>(std::move(scenario).value());
   Commands commands(*shared);
   sim::RigOptions rig_options;
   rig_options.links_folder = links.folder.string();
   if (options.live) rig_options.pilot = [&commands](double now_s) { return commands.at(now_s); };
   auto opened = sim::Rig::open(shared, rig_options);
-  if (!opened) return fail(opened.error().message, 1);
+  if (!opened) return failed("anchord simulate", opened.error().message, 1);
   auto& rig = *opened.value();
   for (const auto& device : rig.devices()) print(device, options.json);
   rig.on_change([&](const sim::ServedDevice& device) { print(device, options.json); });

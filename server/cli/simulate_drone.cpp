@@ -30,7 +30,7 @@ namespace {
 
 using SteadyClock = std::chrono::steady_clock;
 
-struct Options {
+struct SimulatedDroneOptions {
   std::string mavlink{"udp://127.0.0.1:14550"}, url{"http://127.0.0.1:8420"}, token_file, mission, scenario,
       site;
   std::uint64_t seed{1};
@@ -48,7 +48,7 @@ bool told(const Result<T>& result) {
 
 class World {
  public:
-  World(const Options& options, RestClient& client, flight::Scene scene)
+  World(const SimulatedDroneOptions& options, RestClient& client, flight::Scene scene)
       : options_(options),
         client_(client),
         world_(std::move(scene.world)),
@@ -133,8 +133,8 @@ class World {
   }
 
  private:
-  static sim::AutopilotOptions autopilot_options(const Options& options, const sim::World& world,
-                                                 const Eigen::Vector3d& home_m) {
+  static sim::AutopilotOptions autopilot_options(const SimulatedDroneOptions& options,
+                                                 const sim::World& world, const Eigen::Vector3d& home_m) {
     sim::AutopilotOptions out;
     out.dialect = options.px4 ? drone::Autopilot::px4 : drone::Autopilot::ardupilot;
     out.origin = world.origin;
@@ -153,7 +153,7 @@ class World {
     return out;
   }
 
-  const Options& options_;
+  const SimulatedDroneOptions& options_;
   RestClient& client_;
   sim::World world_;
   sim::AutopilotSim autopilot_;
@@ -171,7 +171,7 @@ class World {
 };
 
 /// The site's own, or the demonstration building.
-Result<flight::Scene> scene_of(const Options& options, RestClient& client) {
+Result<flight::Scene> scene_of(const SimulatedDroneOptions& options, RestClient& client) {
   if (options.site.empty())
     return flight::Scene{options.walls ? flight::walled_world() : sim::demonstration_world()};
   BOOST_OUTCOME_TRY(auto scene, fetch_site_scene(client, options.site));
@@ -188,7 +188,7 @@ Result<flight::Scene> scene_of(const Options& options, RestClient& client) {
   return scene;
 }
 
-int simulate_drone(const Options& options) {
+int simulate_drone(const SimulatedDroneOptions& options) {
   const auto address = link::parse_address(options.mavlink);
   if (!told(address)) return 2;
   const auto token = read_token_file(options.token_file);
@@ -233,7 +233,7 @@ int simulate_drone(const Options& options) {
 }  // namespace
 
 void add_simulate_drone(CLI::App& simulate, int& exit_code) {
-  auto o = std::make_shared<Options>();
+  auto o = std::make_shared<SimulatedDroneOptions>();
   auto* command = simulate.add_subcommand(
       "drone", "Simulate an aircraft: MAVLink on a socket, its tag and rover as measurements of a mission");
   command->add_option("--mavlink", o->mavlink, "address where the server expects MAVLink (its drone.address)")

@@ -14,7 +14,7 @@
 namespace anchord::cli {
 namespace {
 
-struct Options {
+struct SimulatedSiteOptions {
   std::string url{"http://127.0.0.1:8420"}, token_file;
   bool over_others{false};
 };
@@ -23,7 +23,7 @@ void tell(const std::string& words) {
   std::fprintf(stderr, "anchord simulate site: %s\n", printable(words).c_str());
 }
 
-Result<void> add_all(const Options& options) {
+Result<void> add_all(const SimulatedSiteOptions& options) {
   BOOST_OUTCOME_TRY(const auto token, read_token_file(options.token_file));
   BOOST_OUTCOME_TRY(const auto client, RestClient::make(options.url, token, interrupted));
   // The model first: ranges of the flight are classified by what is active when they come.
@@ -31,7 +31,7 @@ Result<void> add_all(const Options& options) {
   return add_demonstration_flight(*client, options.over_others, tell);
 }
 
-int simulate_site(const Options& options) {
+int simulate_site(const SimulatedSiteOptions& options) {
   const auto done = add_all(options);
   if (done) return 0;
   tell(done.error().message + "; what was added stays, and the same command continues from there");
@@ -41,7 +41,7 @@ int simulate_site(const Options& options) {
 }  // namespace
 
 void add_simulate_site(CLI::App& simulate, int& exit_code) {
-  auto o = std::make_shared<Options>();
+  auto o = std::make_shared<SimulatedSiteOptions>();
   auto* command = simulate.add_subcommand(
       "site",
       "Add a labelled campaign, a trained and promoted model, a finished flight and a published revision of "

@@ -15,12 +15,12 @@
 namespace anchord::cli {
 namespace {
 
-struct Options {
+struct SupportOptions {
   std::string data_dir{"anchord-data"}, database, out{"anchord-support.tar"};
 };
 
 /// What the server of this folder reports of itself; none when it does not run.
-std::optional<Result<std::string>> from_server(const Options& options) {
+std::optional<Result<std::string>> from_server(const SupportOptions& options) {
   const auto url = running_server(options.data_dir);
   if (!url) return std::nullopt;
   auto client = server::HttpClient::to(*url, std::chrono::seconds(60));
@@ -35,7 +35,7 @@ std::optional<Result<std::string>> from_server(const Options& options) {
 }
 
 /// Without a server: what can be seen from outside.
-std::string from_here(const Options& options) {
+std::string from_here(const SupportOptions& options) {
   DoctorOptions look;
   look.data_dir = options.data_dir;
   look.database = options.database;
@@ -51,7 +51,7 @@ void add_support_command(CLI::App& app, int& exit_code) {
   auto* command = app.add_subcommand("support-bundle",
                                      "Collect versions, settings, log, metrics, events and the findings of "
                                      "anchord doctor in one archive, without secrets");
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<SupportOptions>();
   command->add_option("--data-dir", options->data_dir, "folder of the database [anchord-data]")
       ->envname("ANCHORD_DATA_DIR");
   add_database_option(*command, options->database);

@@ -4,6 +4,7 @@
 
 #include "core/base/text.hpp"
 #include "server/cli/commands.hpp"
+#include "server/cli/failed.hpp"
 #include "server/cli/rest_client.hpp"
 #include "server/cli/server_address.hpp"
 #include "server/sync/peer.hpp"
@@ -14,18 +15,13 @@ namespace {
 
 constexpr int k_undecided = 3;  ///< a person has to decide whose positions hold
 
-struct Options {
+struct SyncOptions {
   std::string to, from, token_file, data_dir{"anchord-data"}, url, url_token_file, reason;
   std::vector<std::string> keep, sites;
   int wait_s{60}, timeout_s{30};
   bool dry_run{false}, activate_models{false};
   bool down() const { return !from.empty(); }
 };
-
-int fail(const std::string& message, int code) {
-  std::fprintf(stderr, "anchord sync: %s\n", printable(message).c_str());
-  return code;
-}
 
 /// "field", "centre", or one of them for a site: "Hall 3=field".
 Result<sync::Decisions> decisions_of(const std::vector<std::string>& words) {
@@ -83,12 +79,12 @@ void print(const sync::Outcome& o, bool down, bool dry_run) {
   for (const auto& one : o.failed) std::printf("FAILED %s\n", printable(one).c_str());
 }
 
-Result<std::string> field_token(const Options& options) {
+Result<std::string> field_token(const SyncOptions& options) {
   if (!options.url_token_file.empty()) return read_token_file(options.url_token_file);
   return folder_token(options.data_dir);
 }
 
-Result<sync::Outcome> run(const Options& options, const sync::Decisions& decisions) {
+Result<sync::Outcome> run(const SyncOptions& options, const sync::Decisions& decisions) {
   const auto local = options.url.empty() ? running_server(options.data_dir) : std::optional(options.url);
   if (!local)
     return make_error(Errc::not_found,
@@ -120,17 +116,18 @@ Result<sync::Outcome> run(const Options& options, const sync::Decisions& decisio
   return sync::sync(*field, *centre, how);
 }
 
-int sync_command(const Options& options) {
+int sync_command(const SyncOptions& options) {
   if (options.to.empty() && options.from.empty())
-    return fail("give the centre with --to (after the trip) or --from (before it)", 2);
+    return failed("anchord sync", "give the centre with --to (after the trip) or --from (before it)", 2);
   const auto decisions = decisions_of(options.keep);
-  if (!decisions) return fail(decisions.error().message, 2);
+  if (!decisions) return failed("anchord sync", decisions.error().message, 2);
   const auto outcome = run(options, decisions.value());
   if (!outcome) {
     const bool input = outcome.error().code == Errc::invalid_argument;
-    return fail(outcome.error().message +
-                    (input ? "" : "; what has arrived stays, run the command again to continue"),
-                input ? 2 : 1);
+    return failed("anchord sync",
+                  outcome.error().message +
+                      (input ? "" : "; what has arrived stays, run the command again to continue"),
+                  input ? 2 : 1);
   }
   print(outcome.value(), options.down(), options.dry_run);
   if (!outcome.value().failed.empty()) return 1;
@@ -142,7 +139,7 @@ int sync_command(const Options& options) {
 void add_sync_command(CLI::App& app, int& exit_code) {
   auto* command = app.add_subcommand(
       "sync", "Send the work of a running field server to the centre, or take from there what a trip needs");
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<SyncOptions>();
   auto* to = command->add_option(
       "--to", options->to,
       "send finished flights, models and published positions to this centre, like https://centre.example");

@@ -9,6 +9,7 @@
 
 #include "core/base/text.hpp"
 #include "server/cli/commands.hpp"
+#include "server/cli/failed.hpp"
 #include "server/runtime/private_file.hpp"
 #include "server/tls/certificate_maker.hpp"
 #include "server/tls/tls_keeper.hpp"
@@ -19,7 +20,7 @@ namespace {
 namespace fs = std::filesystem;
 using server::PemPair;
 
-struct Options {
+struct TlsOptions {
   std::string data_dir{"anchord-data"}, dir;
   server::ServerNames wanted;
   bool force{false};
@@ -28,11 +29,6 @@ struct Options {
 
 constexpr std::string_view k_authority = "ca.pem", k_authority_key = "ca.key";
 constexpr std::string_view k_certificate = "server.pem", k_key = "server.key";
-
-int fail(const std::string& message, int code = 1) {
-  std::fprintf(stderr, "anchord: %s\n", printable(message).c_str());
-  return code;
-}
 
 std::string text_of(const fs::path& file) {
   std::ifstream in(file, std::ios::binary);
@@ -79,7 +75,7 @@ std::string full_path(const fs::path& path) {
 int print_made(const fs::path& folder) {
   const auto facts = server::facts_of(text_of(folder / k_certificate), std::string(k_certificate));
   const auto authority = server::facts_of(text_of(folder / k_authority), std::string(k_authority));
-  if (!facts || !authority) return fail("cannot read what was written to " + folder.string());
+  if (!facts || !authority) return failed("anchord", "cannot read what was written to " + folder.string());
   std::printf("certificate  %s\n  for        %s\n  until      %s\nauthority    %s\n  SHA-256    %s\n",
               full_path(folder / k_certificate).c_str(), printable(joined(facts.value().names)).c_str(),
               to_rfc3339(facts.value().not_after).c_str(), full_path(folder / k_authority).c_str(),
@@ -105,12 +101,13 @@ void print_next_steps(const fs::path& folder) {
       full_path(folder / k_certificate).c_str(), full_path(folder / k_key).c_str(), ca.c_str());
 }
 
-int init(Options options) {
+int init(TlsOptions options) {
   const fs::path folder = options.folder();
   std::error_code error;
   for (const auto name : {k_authority, k_authority_key, k_certificate, k_key}) {
     if (options.force || !fs::exists(folder / name, error)) continue;
-    return fail(
+    return failed(
+        "anchord",
         (folder / name).string() +
             " already exists: 'anchord tls renew' creates a new certificate that clients trust without a "
             "change; --force also replaces the authority, which every client must then be set to "
@@ -121,38 +118,39 @@ int init(Options options) {
   add_loopback(options.wanted.names);
   const auto now = SystemClock{}.now();
   const auto authority = server::make_authority(now);
-  if (!authority) return fail(authority.error().message);
+  if (!authority) return failed("anchord", authority.error().message);
   const auto made = server::make_server_certificate(authority.value(), options.wanted, now);
-  if (!made) return fail(made.error().message, 2);
+  if (!made) return failed("anchord", made.error().message, 2);
   fs::create_directories(folder, error);
-  if (error) return fail("cannot make " + folder.string() + ": " + error.message());
+  if (error) return failed("anchord", "cannot make " + folder.string() + ": " + error.message());
   if (const auto written = write_pair(folder / k_authority, folder / k_authority_key, authority.value());
       !written)
-    return fail(written.error().message);
+    return failed("anchord", written.error().message);
   if (const auto written = write_pair(folder / k_certificate, folder / k_key, made.value()); !written)
-    return fail(written.error().message);
+    return failed("anchord", written.error().message);
   if (const int code = print_made(folder); code != 0) return code;
   print_next_steps(folder);
   return 0;
 }
 
-int renew(Options options) {
+int renew(TlsOptions options) {
   const fs::path folder = options.folder();
   const PemPair authority{text_of(folder / k_authority), text_of(folder / k_authority_key)};
   if (authority.certificate.empty() || authority.key.empty())
-    return fail("no authority (ca.pem and ca.key) in " + folder.string() +
-                    ": 'anchord tls init' creates one; give another folder with --dir",
-                2);
+    return failed("anchord",
+                  "no authority (ca.pem and ca.key) in " + folder.string() +
+                      ": 'anchord tls init' creates one; give another folder with --dir",
+                  2);
   if (options.wanted.names.empty()) {
     const auto former = server::facts_of(text_of(folder / k_certificate), (folder / k_certificate).string());
-    if (!former) return fail(former.error().message + "; give its names with --name", 2);
+    if (!former) return failed("anchord", former.error().message + "; give its names with --name", 2);
     options.wanted.names = former.value().names;
   }
   add_loopback(options.wanted.names);
   const auto made = server::make_server_certificate(authority, options.wanted, SystemClock{}.now());
-  if (!made) return fail(made.error().message, 2);
+  if (!made) return failed("anchord", made.error().message, 2);
   if (const auto written = write_pair(folder / k_certificate, folder / k_key, made.value()); !written)
-    return fail(written.error().message);
+    return failed("anchord", written.error().message);
   if (const int code = print_made(folder); code != 0) return code;
   std::printf(
       "\nA running server loads it at SIGHUP (systemctl reload anchord). Clients already trust it.\n");
@@ -162,7 +160,7 @@ int renew(Options options) {
 int show(const std::string& file) {
   const std::string text = text_of(file);
   const auto facts = server::facts_of(text, file);
-  if (!facts) return fail(facts.error().message, 2);
+  if (!facts) return failed("anchord", facts.error().message, 2);
   std::printf("for      %s\nfrom     %s\nuntil    %s\nSHA-256  %s\n",
               printable(joined(facts.value().names)).c_str(), to_rfc3339(facts.value().not_before).c_str(),
               to_rfc3339(facts.value().not_after).c_str(), facts.value().sha256.c_str());
@@ -180,7 +178,7 @@ void add_tls_command(CLI::App& app, int& exit_code) {
   auto* command =
       app.add_subcommand("tls", "Create and show the certificate of a server without a public name");
   command->require_subcommand(1);
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<TlsOptions>();
   const auto common = [&](CLI::App* sub) {
     sub->add_option("--data-dir", options->data_dir, "folder of the database [anchord-data]")
         ->envname("ANCHORD_DATA_DIR");

@@ -10,6 +10,7 @@
 #include "api/measurements/flight_requests.hpp"
 #include "core/base/text.hpp"
 #include "server/cli/commands.hpp"
+#include "server/cli/failed.hpp"
 #include "server/cli/progress.hpp"
 #include "server/cli/rest_client.hpp"
 #include "server/cli/server_address.hpp"
@@ -23,20 +24,15 @@ using SteadyClock = std::chrono::steady_clock;
 constexpr auto k_answer_within = std::chrono::seconds(3);  ///< also how long Ctrl-C may have to wait
 constexpr auto k_look_every = std::chrono::milliseconds(50);
 
-struct Options {
+struct TopOptions {
   std::string url, data_dir{"anchord-data"}, token_file;
   double interval_s{1};
   bool once{false}, data_dir_given{false};
 };
 
-int fail(const std::string& message, int code) {
-  std::fprintf(stderr, "anchord top: %s\n", printable(message).c_str());
-  return code;
-}
-
 /// The folder's own token is for the folder's own server: an address that was named gets it only when the
 /// folder was named too.
-Result<std::string> token_for(const Options& options) {
+Result<std::string> token_for(const TopOptions& options) {
   if (!options.token_file.empty()) return read_token_file(options.token_file);
   if (options.url.empty() || options.data_dir_given) return own_token(options.data_dir);
   return read_token_file("");
@@ -141,24 +137,25 @@ int watch(server::HttpClient& client, TopDocuments documents, TopReading reading
   return 0;
 }
 
-int top(const Options& options) {
+int top(const TopOptions& options) {
   const auto token = token_for(options);
-  if (!token) return fail(token.error().message, 2);
+  if (!token) return failed("anchord top", token.error().message, 2);
   const auto url =
       !options.url.empty() ? options.url : running_server(options.data_dir).value_or("http://127.0.0.1:8420");
   auto client = server::HttpClient::to(url, k_answer_within);
-  if (!client) return fail(client.error().message, 2);
+  if (!client) return failed("anchord top", client.error().message, 2);
   if (!token.value().empty()) client.value().set_header("Authorization", "Bearer " + token.value());
   interrupted();  // from here on a signal is remembered, so that the terminal is restored
   auto first = read_all(client.value());
   if (!first && first.error().code == Errc::canceled) return 0;
   if (!first)
-    return fail("no anchord server answers at " + url + ": " + first.error().message +
-                    " ('anchord doctor' looks). Give another address with --url",
-                1);
+    return failed("anchord top",
+                  "no anchord server answers at " + url + ": " + first.error().message +
+                      " ('anchord doctor' looks). Give another address with --url",
+                  1);
   auto documents = std::move(first).value();
   if (!documents.system.problem.empty() && !documents.devices.problem.empty())
-    return fail(url + ": " + documents.system.problem, 1);
+    return failed("anchord top", url + ": " + documents.system.problem, 1);
   const auto now = SystemClock().now();
   const TopReading reading{url, now, now, {}};
   if (!options.once && ::isatty(STDOUT_FILENO) != 0)
@@ -172,7 +169,7 @@ int top(const Options& options) {
 void add_top_command(CLI::App& app, int& exit_code) {
   auto* command = app.add_subcommand(
       "top", "Show a running server on one screen: alarms, mission, devices, queues, jobs (Ctrl-C ends)");
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<TopOptions>();
   command->add_flag("--once", options->once,
                     "print once as plain text; this is also done when the output is a file or pipe");
   command->add_option("--interval", options->interval_s, "seconds between two readings [1]")

@@ -10,11 +10,11 @@
 namespace anchord::cli {
 namespace {
 
-constexpr int k_differs = 1, k_unusable = 2;
+constexpr int k_differs = 1, k_unusable_pack = 2;
 
-int fail(const std::string& message) {
+int unusable(const std::string& message) {
   std::fprintf(stderr, "%s\n", printable(message).c_str());
-  return k_unusable;
+  return k_unusable_pack;
 }
 
 int verify(const std::string& pack, const std::string& key_file) {
@@ -22,13 +22,13 @@ int verify(const std::string& pack, const std::string& key_file) {
   if (!key_file.empty()) {
     std::ifstream in(key_file, std::ios::binary);
     const std::string pem{std::istreambuf_iterator<char>(in), {}};
-    if (!in) return fail("cannot read " + key_file);
+    if (!in) return unusable("cannot read " + key_file);
     auto parsed = Ed25519Public::parse_pem(pem);
-    if (!parsed) return fail(key_file + ": " + parsed.error().message);
+    if (!parsed) return unusable(key_file + ": " + parsed.error().message);
     key = std::move(parsed).value();
   }
   const auto verdict = api::verify_pack(pack, key);
-  if (!verdict) return fail(pack + ": " + verdict.error().message);
+  if (!verdict) return unusable(pack + ": " + verdict.error().message);
   const auto& v = verdict.value();
   for (const auto& fault : v.faults) std::printf("differs: %s\n", printable(fault).c_str());
   if (!v.faults.empty()) return k_differs;

@@ -27,10 +27,6 @@ constexpr std::int64_t k_day_s = 86'400;
 /// Tablets in the field have clocks that are behind.
 constexpr std::int64_t k_backdated_s = k_day_s;
 
-struct BioFree {
-  void operator()(BIO* bio) const { BIO_free(bio); }
-};
-using Bio = std::unique_ptr<BIO, BioFree>;
 struct NamesFree {
   void operator()(GENERAL_NAMES* names) const { GENERAL_NAMES_free(names); }
 };

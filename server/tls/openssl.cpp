@@ -8,11 +8,6 @@
 namespace anchord::server {
 namespace {
 
-struct BioFree {
-  void operator()(BIO* bio) const { BIO_free(bio); }
-};
-using Bio = std::unique_ptr<BIO, BioFree>;
-
 Bio reader(std::string_view text) { return Bio(BIO_new_mem_buf(text.data(), static_cast<int>(text.size()))); }
 
 /// A server has nobody who types a passphrase; OpenSSL's own would ask the terminal.
@@ -20,6 +15,7 @@ int no_passphrase(char*, int, int, void*) { return 0; }
 
 }  // namespace
 
+void free_bio(bio_st* bio) { BIO_free(bio); }
 void free_certificate(x509_st* certificate) { X509_free(certificate); }
 void free_key(evp_pkey_st* key) { EVP_PKEY_free(key); }
 

@@ -15,7 +15,7 @@ namespace {
 
 using Ordered = nlohmann::ordered_json;
 
-const MissionId k_mission{parse_uuid("0197a3b0-1111-7222-8333-444455556666").value()};
+const MissionId k_read_mission{parse_uuid("0197a3b0-1111-7222-8333-444455556666").value()};
 
 std::string line(const Range& range, bool with_cir = true, const Ordered& rest = Ordered::object()) {
   std::string out;
@@ -29,7 +29,7 @@ std::string line(const Fix& fix) {
 }
 
 Range full_range() {
-  Range r = testing::full_range(k_mission);
+  Range r = testing::full_range(k_read_mission);
   r.std_noise = 1e-7;
   r.truth = RangeTruth{7.35, true};
   Cir cir;
@@ -56,7 +56,7 @@ TEST(RowText, OfARangeIsWhatItWas) {
   EXPECT_EQ(line(range, false, {{"predicted", {{"class", "unclear"}, {"p_los", nullptr}}}}),
             k_head + R"(,"predicted":{"class":"unclear","p_los":null}})");
   Range bare;
-  bare.mission = k_mission;
+  bare.mission = k_read_mission;
   bare.kind = RangeKind::anchor_anchor;
   bare.distance_m = 7;
   bare.truth = RangeTruth{};
@@ -66,13 +66,13 @@ TEST(RowText, OfARangeIsWhatItWas) {
 }
 
 TEST(RowText, OfAPositionIsWhatItWas) {
-  EXPECT_EQ(line(testing::full_fix(k_mission)),
+  EXPECT_EQ(line(testing::full_fix(k_read_mission)),
             R"({"id":1,"t_us":1777889472200000,"mission":"0197a3b0-1111-7222-8333-444455556666","seq":7,)"
             R"("lon":11.576124123456,"lat":48.137154321987,"h_m":521.1234,"fix":"fixed",)"
             R"("cov_enu_m2":[0.0001,1e-06,-2e-06,0.00011,3e-06,0.0004],"q":[0.5,-0.5,0.5,0.5],)"
             R"("correction_age_s":0.7,"satellites":21})");
   Fix local;
-  local.mission = k_mission;
+  local.mission = k_read_mission;
   local.frame = TrackFrame::local;
   local.local_m = {1, -2.5, 0};
   EXPECT_EQ(line(local).substr(0, 116),

@@ -18,7 +18,7 @@ std::string example() {
   return {std::istreambuf_iterator<char>(file), {}};
 }
 
-std::vector<std::string> pointers(std::string_view json) {
+std::vector<std::string> outline_pointers(std::string_view json) {
   std::vector<FieldError> errors;
   EXPECT_FALSE(read_outline(json, errors));
   std::vector<std::string> out;
@@ -40,14 +40,15 @@ TEST(Outline, ReadsTheExampleInMetres) {
 }
 
 TEST(Outline, NamesWhatIsWrongByPointer) {
-  EXPECT_THAT(pointers("{"), testing::SizeIs(1));
-  EXPECT_THAT(pointers(R"({"type":"Point","coordinates":[1,2]})"),
+  EXPECT_THAT(outline_pointers("{"), testing::SizeIs(1));
+  EXPECT_THAT(outline_pointers(R"({"type":"Point","coordinates":[1,2]})"),
               testing::ElementsAre("/type unknown_value"));
-  EXPECT_THAT(pointers(R"({"type":"Polygon","coordinates":[[[3,51],[3.1,51],[3.1,"x"]]]})"),
+  EXPECT_THAT(outline_pointers(R"({"type":"Polygon","coordinates":[[[3,51],[3.1,51],[3.1,"x"]]]})"),
               testing::ElementsAre("/coordinates/0/2 wrong_type"));
-  EXPECT_THAT(pointers(R"({"type":"Polygon","coordinates":[[[51,300],[3.1,51],[3.1,52]]]})"),
+  EXPECT_THAT(outline_pointers(R"({"type":"Polygon","coordinates":[[[51,300],[3.1,51],[3.1,52]]]})"),
               testing::ElementsAre("/coordinates/0/0 out_of_range"));
-  EXPECT_THAT(pointers(R"({"type":"FeatureCollection","features":[]})"), testing::ElementsAre(" required"));
+  EXPECT_THAT(outline_pointers(R"({"type":"FeatureCollection","features":[]})"),
+              testing::ElementsAre(" required"));
 }
 
 TEST(Outline, ReadsSeveralPartsAsTheirHull) {
@@ -72,7 +73,8 @@ TEST(Outline, LiesOverTheDateLine) {
 
 TEST(Outline, ThatCrossesItselfIsRefused) {
   EXPECT_THAT(
-      pointers(R"({"type":"Polygon","coordinates":[[[3,51],[3.001,51.001],[3.001,51],[3,51.001],[3,51]]]})"),
+      outline_pointers(
+          R"({"type":"Polygon","coordinates":[[[3,51],[3.001,51.001],[3.001,51],[3,51.001],[3,51]]]})"),
       testing::ElementsAre("/coordinates/0 self_crossing"));
 }
 

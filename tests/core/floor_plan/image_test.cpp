@@ -14,7 +14,7 @@
 namespace anchord::floor_plan {
 namespace {
 
-std::span<const std::byte> bytes(const std::string& text) { return std::as_bytes(std::span(text)); }
+std::span<const std::byte> image_bytes(const std::string& text) { return std::as_bytes(std::span(text)); }
 
 Image picture(int width, int height) {
   Image image{width, height, 3, {}};
@@ -54,24 +54,24 @@ TEST(PlanImage, OfEachFormatIsReadAsItWasWritten) {
   const auto image = picture(40, 30);
   const auto png = encode_png(image);
   ASSERT_TRUE(png.has_value());
-  const auto head = image_head(bytes(png.value()));
+  const auto head = image_head(image_bytes(png.value()));
   ASSERT_TRUE(head.has_value());
   EXPECT_EQ(head.value().format, ImageFormat::png);
   EXPECT_EQ(head.value().width_px, 40);
   EXPECT_EQ(head.value().height_px, 30);
-  const auto back = decode_image(bytes(png.value()));
+  const auto back = decode_image(image_bytes(png.value()));
   ASSERT_TRUE(back.has_value()) << back.error().message;
   EXPECT_EQ(back.value().pixels, image.pixels);
 
   const auto jpeg = jpeg_of(image);
-  ASSERT_TRUE(image_head(bytes(jpeg)).has_value());
-  EXPECT_EQ(image_head(bytes(jpeg)).value().width_px, 40);
-  const auto lossy = decode_image(bytes(jpeg));
+  ASSERT_TRUE(image_head(image_bytes(jpeg)).has_value());
+  EXPECT_EQ(image_head(image_bytes(jpeg)).value().width_px, 40);
+  const auto lossy = decode_image(image_bytes(jpeg));
   ASSERT_TRUE(lossy.has_value()) << lossy.error().message;
   EXPECT_NEAR(lossy.value().pixels[3 * (10 * 40 + 20)], 60, 12);  // quality 75
 
   for (const bool big_endian : {false, true}) {
-    const auto grey = decode_image(bytes(tiff(big_endian, false)));
+    const auto grey = decode_image(image_bytes(tiff(big_endian, false)));
     ASSERT_TRUE(grey.has_value()) << grey.error().message;
     EXPECT_EQ(grey.value().width_px, 4);
     EXPECT_EQ(grey.value().pixels[3], 0x40);
@@ -81,7 +81,7 @@ TEST(PlanImage, OfEachFormatIsReadAsItWasWritten) {
 
 TEST(PlanImage, OfGeoTiffKnowsWhereItLies) {
   for (const bool big_endian : {false, true}) {
-    const auto head = image_head(bytes(tiff(big_endian, false)));
+    const auto head = image_head(image_bytes(tiff(big_endian, false)));
     ASSERT_TRUE(head.has_value()) << head.error().message;
     ASSERT_TRUE(head.value().geo);
     EXPECT_EQ(head.value().geo->epsg, 25831);
@@ -90,29 +90,30 @@ TEST(PlanImage, OfGeoTiffKnowsWhereItLies) {
     EXPECT_NEAR(at.x(), 500001, 1e-9);
     EXPECT_NEAR(at.y(), 5600000 - 0.25, 1e-9);
   }
-  const auto point = image_head(bytes(tiff(false, true)));
+  const auto point = image_head(image_bytes(tiff(false, true)));
   const Eigen::Vector2d middle = point.value().geo->map_from_pixel * Eigen::Vector3d(0.5, 0.5, 1);
   EXPECT_NEAR(middle.x(), 500000, 1e-9);
-  EXPECT_TRUE(image_head(bytes(tiff(false, false, 2048, 4326))).value().geo->geographic);
-  EXPECT_FALSE(image_head(bytes(tiff(false, false, 3072, 32767))).value().geo);  // user-defined: no code
+  EXPECT_TRUE(image_head(image_bytes(tiff(false, false, 2048, 4326))).value().geo->geographic);
+  EXPECT_FALSE(
+      image_head(image_bytes(tiff(false, false, 3072, 32767))).value().geo);  // user-defined: no code
 }
 
 TEST(PlanImage, IsRefusedByItsSizeBeforeAnythingIsDecoded) {
   const auto bomb = png_head(50'000, 50'000);
-  const auto head = image_head(bytes(bomb));
+  const auto head = image_head(image_bytes(bomb));
   ASSERT_FALSE(head.has_value());
   EXPECT_EQ(head.error().code, Errc::invalid_argument);
   EXPECT_NE(head.error().message.find("50000 x 50000 pixels (limit 30000"), std::string::npos)
       << head.error().message;
-  EXPECT_EQ(decode_image(bytes(bomb)).error().code, Errc::invalid_argument);
-  EXPECT_EQ(image_head(bytes(png_head(0xffffffff, 1))).error().code, Errc::invalid_argument);
-  EXPECT_EQ(image_head(bytes(png_head(0, 5))).error().code, Errc::bad_frame);
+  EXPECT_EQ(decode_image(image_bytes(bomb)).error().code, Errc::invalid_argument);
+  EXPECT_EQ(image_head(image_bytes(png_head(0xffffffff, 1))).error().code, Errc::invalid_argument);
+  EXPECT_EQ(image_head(image_bytes(png_head(0, 5))).error().code, Errc::bad_frame);
 }
 
 TEST(PlanImage, OfAnotherKindIsRefusedWithWhatIsAccepted) {
   for (const auto& file : std::vector<std::string>{"%PDF-1.7 ...", "0\r\nSECTION\r\n", "<svg/>", "",
                                                    std::string("II\x2b\0", 4)}) {
-    const auto head = image_head(bytes(file));
+    const auto head = image_head(image_bytes(file));
     ASSERT_FALSE(head.has_value()) << file;
     EXPECT_EQ(head.error().code, Errc::unsupported);
     EXPECT_NE(head.error().message.find("PNG, JPEG, (Geo)TIFF, PDF or ASCII DXF"), std::string::npos);
@@ -120,10 +121,10 @@ TEST(PlanImage, OfAnotherKindIsRefusedWithWhatIsAccepted) {
 }
 
 TEST(PlanImage, OfAJpegWithMoreScansThanAnyProgramWritesIsRefused) {
-  const auto plain = decode_image(bytes(jpeg_of_scans(800, 9)));
+  const auto plain = decode_image(image_bytes(jpeg_of_scans(800, 9)));
   ASSERT_TRUE(plain.has_value()) << plain.error().message;
   EXPECT_EQ(plain.value().pixels.at(0), 128) << "the middle grey that zero stands for";
-  const auto bomb = decode_image(bytes(jpeg_of_scans(800, 600)));
+  const auto bomb = decode_image(image_bytes(jpeg_of_scans(800, 600)));
   ASSERT_FALSE(bomb.has_value());
   EXPECT_EQ(bomb.error().code, Errc::bad_frame);
   EXPECT_NE(bomb.error().message.find("more than 500 scans"), std::string::npos) << bomb.error().message;
@@ -133,10 +134,10 @@ TEST(PlanImage, CutShortAnywhereIsAnErrorAndNeverHalfAPicture) {
   const auto image = picture(40, 30);
   for (const auto& whole : {encode_png(image).value(), jpeg_of(image), tiff(false, false)}) {
     for (std::size_t n = 0; n < whole.size() - 2; n += n < 64 ? 1 : 7) {
-      const auto half = decode_image(bytes(whole.substr(0, n)));
+      const auto half = decode_image(image_bytes(whole.substr(0, n)));
       // A PNG that lacks its end mark alone has all its pixels.
       if (!half) continue;
-      EXPECT_EQ(half.value().pixels, decode_image(bytes(whole)).value().pixels) << n;
+      EXPECT_EQ(half.value().pixels, decode_image(image_bytes(whole)).value().pixels) << n;
       EXPECT_GE(n + 12, whole.size()) << "cut off more than the end mark";
     }
   }
@@ -149,7 +150,7 @@ TEST(PlanImage, WithAnyByteBrokenIsReadOrRefusedAndNothingElse) {
       for (const char value : {'\0', '\xff', '\x7f'}) {
         auto spoilt = whole;
         spoilt[i] = value;
-        const auto read = decode_image(bytes(spoilt));
+        const auto read = decode_image(image_bytes(spoilt));
         if (!read) continue;
         EXPECT_EQ(read.value().pixels.size(),
                   3u * static_cast<unsigned>(read.value().width_px * read.value().height_px));
@@ -205,7 +206,7 @@ TEST(PlanImage, IsHalvedUntilItsPngFits) {
   const auto png = encode_png_within(noise, 60'000);
   ASSERT_TRUE(png.has_value());
   EXPECT_LE(png.value().size(), 60'000u);
-  EXPECT_EQ(image_head(bytes(png.value())).value().width_px, 128);
+  EXPECT_EQ(image_head(image_bytes(png.value())).value().width_px, 128);
 }
 
 }  // namespace

@@ -73,10 +73,10 @@ double mean_normalised_square(double noise_m, double believed_m) {
   options.delay_prior_m = options.curve_prior_m = options.lag_prior_s = options.lever_prior_m = 1e-5;
   options.correlation_s = 0;
   options.floor_sigma_m = 0;
-  constexpr int k_seeds = 25;
+  constexpr int k_seeded = 25;
   double sum = 0;
   int n = 0;
-  for (int seed = 1; seed <= k_seeds; ++seed) {
+  for (int seed = 1; seed <= k_seeded; ++seed) {
     testing::MadeFlight made;
     made.seed = static_cast<std::uint64_t>(seed);
     made.noise_m = noise_m;

@@ -15,10 +15,10 @@ namespace {
 using Eigen::Vector3d;
 
 const Polygon k_hall{{0, 0}, {30, 0}, {30, 20}, {0, 20}};
-const Polygon k_ell{{0, 0}, {40, 0}, {40, 15}, {15, 15}, {15, 40}, {0, 40}};
+const Polygon k_l_outline{{0, 0}, {40, 0}, {40, 15}, {15, 15}, {15, 40}, {0, 40}};
 
 TEST(Ring, KeepsItsDistanceRoundEveryCorner) {
-  for (const auto& outline : {k_hall, k_ell, Polygon(k_ell.rbegin(), k_ell.rend())}) {
+  for (const auto& outline : {k_hall, k_l_outline, Polygon(k_l_outline.rbegin(), k_l_outline.rend())}) {
     const auto ring = ring_around(outline, 4, 2);
     ASSERT_GT(ring.size(), 40U);
     for (const auto& p : ring) {
@@ -55,7 +55,7 @@ TEST(FlightPlan, FliesRoundAHallAtItsKeepOutDistance) {
 }
 
 TEST(FlightPlan, GoesRoundTheNotchOfAnL) {
-  expect_legal(plan_flight({k_ell, 9, {}, {}}, {}).value(), k_ell, 4);
+  expect_legal(plan_flight({k_l_outline, 9, {}, {}}, {}).value(), k_l_outline, 4);
 }
 
 // A lawn-mower ring of as many points at one height, evenly spread, is what people fly by hand.
@@ -104,7 +104,8 @@ TEST(FlightPlan, NamesWhatMakesItImpossible) {
 }
 
 TEST(FlightPlan, IsTheSameEveryTime) {
-  const auto a = plan_flight({k_ell, 9, {}, {}}, {}).value(), b = plan_flight({k_ell, 9, {}, {}}, {}).value();
+  const auto a = plan_flight({k_l_outline, 9, {}, {}}, {}).value(),
+             b = plan_flight({k_l_outline, 9, {}, {}}, {}).value();
   ASSERT_EQ(a.waypoints.size(), b.waypoints.size());
   for (std::size_t i = 0; i < a.waypoints.size(); ++i)
     EXPECT_EQ(a.waypoints[i].point_m, b.waypoints[i].point_m);

@@ -13,17 +13,17 @@
 namespace anchord::procedure {
 namespace {
 
-constexpr NetworkId k_anchor{0x6a21}, k_other{0x6a22};
+constexpr NetworkId k_prior_anchor{0x6a21}, k_other{0x6a22};
 constexpr double k_plane_y_m = -8;
 const Eigen::Vector3d k_inside(3, 4, 5), k_turned_at(0, k_plane_y_m, 7);
 
 TEST(FlightPriors, MeanTheSameInAnotherFrame) {
   const EnuFrame plan({51.0231, 3.7131, 55.5}), answers({51.0271, 3.7131, 60.0});
   std::map<NetworkId, Priors> found;
-  found[k_anchor].bearing = Bearing{1.2, 0.4, 0.8};
-  found[k_anchor].turned_at_m = k_turned_at;
-  found[k_anchor].height = HeightGuess{5, 0.3, 9, false};
-  found[k_anchor].climbed_at_m = k_turned_at;
+  found[k_prior_anchor].bearing = Bearing{1.2, 0.4, 0.8};
+  found[k_prior_anchor].turned_at_m = k_turned_at;
+  found[k_prior_anchor].height = HeightGuess{5, 0.3, 9, false};
+  found[k_prior_anchor].climbed_at_m = k_turned_at;
   found[k_other].height = HeightGuess{9, 1.5, 0, true};
   found[k_other].climbed_at_m = k_turned_at;
   const auto kept = flight_priors(found, plan);
@@ -33,24 +33,24 @@ TEST(FlightPriors, MeanTheSameInAnotherFrame) {
   EXPECT_EQ(flight_priors(found, plan).size(), 1u) << "a peak of a reflection";
   ASSERT_EQ(kept.size(), 1u) << "the best level of the other lay at the end of its search";
   const auto here = priors_in(kept, plan), there = priors_in(kept, answers);
-  EXPECT_LT((here.at(k_anchor).bearing->tag_m - k_turned_at).norm(), 1e-6);
-  EXPECT_DOUBLE_EQ(here.at(k_anchor).bearing->bearing_rad, 1.2);
-  EXPECT_DOUBLE_EQ(here.at(k_anchor).bearing->sigma_rad, 0.4);
-  EXPECT_NEAR(here.at(k_anchor).height->up_m, 5, 1e-6);
-  EXPECT_GT(here.at(k_anchor).height->sigma_m, 0.3);
+  EXPECT_LT((here.at(k_prior_anchor).bearing->tag_m - k_turned_at).norm(), 1e-6);
+  EXPECT_DOUBLE_EQ(here.at(k_prior_anchor).bearing->bearing_rad, 1.2);
+  EXPECT_DOUBLE_EQ(here.at(k_prior_anchor).bearing->sigma_rad, 0.4);
+  EXPECT_NEAR(here.at(k_prior_anchor).height->up_m, 5, 1e-6);
+  EXPECT_GT(here.at(k_prior_anchor).height->sigma_m, 0.3);
   // 0.004 degrees north of there is 445 m; the earth falls away by 16 mm meanwhile.
-  EXPECT_NEAR(there.at(k_anchor).bearing->tag_m.y(), k_plane_y_m - 445.1, 0.2);
-  EXPECT_NEAR(there.at(k_anchor).height->up_m, 5 - 4.5, 0.03);
+  EXPECT_NEAR(there.at(k_prior_anchor).bearing->tag_m.y(), k_plane_y_m - 445.1, 0.2);
+  EXPECT_NEAR(there.at(k_prior_anchor).height->up_m, 5 - 4.5, 0.03);
 }
 
 TEST(FlightPriors, OfALaterTurnReplaceTheFormer) {
   FlightPriors before, after;
-  before[k_anchor].bearing = FlightPrior::Bearing{{}, 1, 0.4};
-  before[k_anchor].height = FlightPrior::Height{{}, 1};
-  after[k_anchor].bearing = FlightPrior::Bearing{{}, 2, 0.4};
+  before[k_prior_anchor].bearing = FlightPrior::Bearing{{}, 1, 0.4};
+  before[k_prior_anchor].height = FlightPrior::Height{{}, 1};
+  after[k_prior_anchor].bearing = FlightPrior::Bearing{{}, 2, 0.4};
   const auto both = merged(before, after);
-  EXPECT_EQ(both.at(k_anchor).bearing->bearing_rad, 2);
-  EXPECT_TRUE(both.at(k_anchor).height);
+  EXPECT_EQ(both.at(k_prior_anchor).bearing->bearing_rad, 2);
+  EXPECT_TRUE(both.at(k_prior_anchor).height);
 }
 
 /// A live flight in one upright plane before the facade: an anchor in the building and its mirror solution in
@@ -73,7 +73,7 @@ LiveFlight facade() {
     Range range;
     range.time = fix.time;
     range.tag = NetworkId{0x6e01};
-    range.anchor = k_anchor;
+    range.anchor = k_prior_anchor;
     range.distance_m = (k_inside - at).norm() + 0.05 * noise(random);
     live.add(range);
   }
@@ -102,7 +102,7 @@ TEST(LiveMirrors, AreDecidedByTheTurnWhicheverCameFirst) {
   const Eigen::Vector3d mirror(k_inside.x(), 2 * k_plane_y_m - k_inside.y(), k_inside.z());
   for (const auto& wanted : {k_inside, mirror}) {
     auto live = facade();
-    live.set_priors({{k_anchor, seen_at(bearing_of(wanted) + 0.3, 0.35)}});
+    live.set_priors({{k_prior_anchor, seen_at(bearing_of(wanted) + 0.3, 0.35)}});
     live.finish();
     const auto after = live.estimates().front();
     ASSERT_TRUE(after.best);
@@ -114,7 +114,7 @@ TEST(LiveMirrors, AreDecidedByTheTurnWhicheverCameFirst) {
 
 TEST(LiveMirrors, StandBothWhenTheBearingIsWeak) {
   auto live = facade();
-  live.set_priors({{k_anchor, seen_at(bearing_of(k_inside), 100 * std::numbers::pi / 180)}});
+  live.set_priors({{k_prior_anchor, seen_at(bearing_of(k_inside), 100 * std::numbers::pi / 180)}});
   live.finish();
   const auto after = live.estimates().front();
   ASSERT_TRUE(after.best && after.mirror) << "180 degrees are 1.8 sigma: four to one, not beyond 99 %";

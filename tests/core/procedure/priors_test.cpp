@@ -6,14 +6,13 @@
 #include <random>
 #include <vector>
 
+#include "core/base/angle.hpp"
 #include "core/localize/turn.hpp"
 #include "core/procedure/exit_rule.hpp"
 #include "core/procedure/height_search.hpp"
 
 namespace anchord::procedure {
 namespace {
-
-constexpr double k_degree = std::numbers::pi / 180;
 
 double apart_deg(double a_rad, double b_rad) {
   return std::abs(std::remainder(a_rad - b_rad, 2 * std::numbers::pi)) / k_degree;

@@ -17,7 +17,7 @@ using mavlink::Address;
 using mavlink::Message;
 using mavlink::Packer;
 
-constexpr std::int64_t k_unix_us = 1'777'888'800'000'000;
+constexpr std::int64_t k_signed_us = 1'777'888'800'000'000;
 const std::string k_aircraft = "192.0.2.10:14550", k_stranger = "192.0.2.66:4000";
 
 Message heartbeat(bool armed = false) {
@@ -27,7 +27,7 @@ Message heartbeat(bool armed = false) {
 struct Link {
   explicit Link(std::optional<mavlink::Secret> key = {}) : gate(key) {}
   bool receive(const std::string& sender, const std::vector<std::uint8_t>& bytes) {
-    return gate.admits(now, k_unix_us + static_cast<std::int64_t>(now * 1e6), sender, bytes);
+    return gate.admits(now, k_signed_us + static_cast<std::int64_t>(now * 1e6), sender, bytes);
   }
   PeerGate gate;
   double now{0};
@@ -128,7 +128,7 @@ TEST(PeerGate, WithAKeyOnlySignedFramesTakeTheLinkAndAReplayDoesNot) {
   mavlink::Secret key{};
   key.fill(9);
   Link link(key);
-  const auto stamp = mavlink::signature_time(k_unix_us);
+  const auto stamp = mavlink::signature_time(k_signed_us);
   Packer copter({1, 1}), forger({1, 1}), other({1, 1});
   EXPECT_FALSE(link.receive(k_stranger, forger.pack(heartbeat())));
   mavlink::Secret wrong{};

@@ -4,14 +4,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
+#include "core/base/angle.hpp"
 #include "core/nlos/cir.hpp"
 
 namespace anchord::sim {
 namespace {
-
-constexpr double k_degree = std::numbers::pi / 180.0;
 
 Exchange exchange_at(double rss_dbm, double wall_loss_db) {
   Exchange exchange;

@@ -2,14 +2,11 @@
 
 #include <gtest/gtest.h>
 
-#include <numbers>
-
+#include "core/base/angle.hpp"
 #include "drivers/sim/scenario.hpp"
 
 namespace anchord::sim {
 namespace {
-
-constexpr double k_degree = std::numbers::pi / 180.0;
 
 TEST(FlightPath, FliesHoldsTurnsAndLoops) {
   PathPoint a, b;

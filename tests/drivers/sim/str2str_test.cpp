@@ -28,7 +28,7 @@ const std::string k_1005(
     "\xd3\x00\x13\x3e\xd7\xd3\x02\x02\x98\x0e\xde\xef\x34\xb4\xbd\x62\xac\x09\x41\x98\x6f\x33\x36\x0b\x98",
     25);
 
-struct Rows final : device::DeviceListener {
+struct RowsByTime final : device::DeviceListener {
   void fix(const std::string& id, const Fix& row) override { fixes[id][row.time.ns] = row; }
   void range(const std::string&, const Range&) override {}
   void changed(const std::string&) override {}
@@ -82,7 +82,7 @@ class Str2str : public testing::Test {
   }
   fs::path folder_;
   boost::asio::io_context io_{1};
-  Rows rows_;
+  RowsByTime rows_;
   std::unique_ptr<Rig> rig_;
   device::DeviceLoop loop_{io_, nullptr, rows_, {}};
 };

@@ -5,8 +5,8 @@
 namespace anchord::timing {
 namespace {
 
-constexpr std::int64_t k_s = 1'000'000'000;
-constexpr std::int64_t k_epoch = 1'780'000'000 * k_s;
+constexpr std::int64_t k_second_ns = 1'000'000'000;
+constexpr std::int64_t k_epoch = 1'780'000'000 * k_second_ns;
 
 link::Arrival at(std::int64_t steady_ns, std::int64_t system_off_ns = 0) {
   return {UtcTime{k_epoch + steady_ns + system_off_ns}, steady_ns};
@@ -14,27 +14,27 @@ link::Arrival at(std::int64_t steady_ns, std::int64_t system_off_ns = 0) {
 
 TEST(TimeBase, StepsOfTheSystemClockMoveNothing) {
   TimeBase base;
-  base.arrived(at(10 * k_s));
-  const auto before = base.utc_of(20 * k_s);
-  base.arrived(at(11 * k_s, -7200 * k_s));
-  base.arrived(at(12 * k_s, 3600 * k_s));
-  EXPECT_EQ(base.utc_of(20 * k_s).time, before.time);
-  EXPECT_EQ(before.time.ns, k_epoch + 20 * k_s);
+  base.arrived(at(10 * k_second_ns));
+  const auto before = base.utc_of(20 * k_second_ns);
+  base.arrived(at(11 * k_second_ns, -7200 * k_second_ns));
+  base.arrived(at(12 * k_second_ns, 3600 * k_second_ns));
+  EXPECT_EQ(base.utc_of(20 * k_second_ns).time, before.time);
+  EXPECT_EQ(before.time.ns, k_epoch + 20 * k_second_ns);
   ASSERT_TRUE(base.skew());
   EXPECT_NE(base.skew()->find("ahead by more than 2000 s"), std::string::npos) << *base.skew();
 }
 
 TEST(TimeBase, TakesUtcFromTheReceiverOnceItIsSettled) {
   TimeBase base;
-  const std::int64_t wrong = 5 * k_s;  // the system clock is five seconds ahead
+  const std::int64_t wrong = 5 * k_second_ns;  // the system clock is five seconds ahead
   for (int i = 0; i < 15; ++i) {
-    const auto steady = (100 + i) * k_s;
+    const auto steady = (100 + i) * k_second_ns;
     // measured 80 ms before it arrives, and the operator said so
     base.receiver_said(1, UtcTime{k_epoch + steady - 80'000'000}, at(steady, wrong), 0.08);
   }
   ASSERT_EQ(base.source(), TimeSource::receiver);
-  const auto stamp = base.utc_of(130 * k_s);
-  EXPECT_NEAR(static_cast<double>(stamp.time.ns - (k_epoch + 130 * k_s)), 0, 1e5);
+  const auto stamp = base.utc_of(130 * k_second_ns);
+  EXPECT_NEAR(static_cast<double>(stamp.time.ns - (k_epoch + 130 * k_second_ns)), 0, 1e5);
   EXPECT_GE(stamp.sigma_s, TimeBase::k_latency_sigma_s);
   EXPECT_LT(stamp.sigma_s, 0.03);
   EXPECT_NEAR(base.system_offset_s().value(), 5.0, 1e-3);
@@ -46,7 +46,7 @@ TEST(TimeBase, NamesTheSameSkewInTheSameWordsUntilItIsAnother) {
   TimeBase base;
   const auto skew_at = [&](std::int64_t system_off_ns) {
     for (int i = 0; i < 15; ++i) {
-      const auto steady = (100 + i) * k_s;
+      const auto steady = (100 + i) * k_second_ns;
       base.receiver_said(1, UtcTime{k_epoch + steady}, at(steady, system_off_ns), 0);
     }
     return base.skew().value_or("");
@@ -60,7 +60,7 @@ TEST(TimeBase, NamesTheSameSkewInTheSameWordsUntilItIsAnother) {
 TEST(TimeBase, IsQuietWhileTheSystemClockIsRight) {
   TimeBase base;
   for (int i = 0; i < 15; ++i) {
-    const auto steady = (100 + i) * k_s;
+    const auto steady = (100 + i) * k_second_ns;
     base.receiver_said(1, UtcTime{k_epoch + steady - 60'000'000}, at(steady), 0.05);
   }
   EXPECT_FALSE(base.skew());
@@ -69,11 +69,12 @@ TEST(TimeBase, IsQuietWhileTheSystemClockIsRight) {
 TEST(TimeBase, ASecondReceiverDoesNotDisturbTheFirst) {
   TimeBase base;
   for (int i = 0; i < 15; ++i) {
-    const auto steady = (100 + i) * k_s;
+    const auto steady = (100 + i) * k_second_ns;
     base.receiver_said(1, UtcTime{k_epoch + steady}, at(steady), 0);
-    base.receiver_said(2, UtcTime{k_epoch + steady + 999 * k_s}, at(steady), 0);
+    base.receiver_said(2, UtcTime{k_epoch + steady + 999 * k_second_ns}, at(steady), 0);
   }
-  EXPECT_NEAR(static_cast<double>(base.utc_of(120 * k_s).time.ns - (k_epoch + 120 * k_s)), 0, 1e5);
+  EXPECT_NEAR(static_cast<double>(base.utc_of(120 * k_second_ns).time.ns - (k_epoch + 120 * k_second_ns)), 0,
+              1e5);
 }
 
 /// A receiver of which the week was wrong was taken away, and its successor never followed: every range of
@@ -81,31 +82,34 @@ TEST(TimeBase, ASecondReceiverDoesNotDisturbTheFirst) {
 /// too.
 TEST(TimeBase, AnotherReceiverTakesOverOnceTheFirstWasRemoved) {
   TimeBase base;
-  const std::int64_t wrong = 1024LL * 7 * 86'400 * k_s;
+  const std::int64_t wrong = 1024LL * 7 * 86'400 * k_second_ns;
   for (int i = 0; i < 15; ++i)
-    base.receiver_said(1, UtcTime{k_epoch + (100 + i) * k_s - wrong}, at((100 + i) * k_s), 0);
+    base.receiver_said(1, UtcTime{k_epoch + (100 + i) * k_second_ns - wrong}, at((100 + i) * k_second_ns), 0);
   ASSERT_EQ(base.source(), TimeSource::receiver);
   base.receiver_gone(1);
-  EXPECT_EQ(base.utc_of(116 * k_s).time.ns, k_epoch + 116 * k_s - wrong) << "there is no other yet";
+  EXPECT_EQ(base.utc_of(116 * k_second_ns).time.ns, k_epoch + 116 * k_second_ns - wrong)
+      << "there is no other yet";
   for (int i = 20; i < 35; ++i)
-    base.receiver_said(2, UtcTime{k_epoch + (100 + i) * k_s}, at((100 + i) * k_s), 0);
-  EXPECT_NEAR(static_cast<double>(base.utc_of(136 * k_s).time.ns - (k_epoch + 136 * k_s)), 0, 1e5);
+    base.receiver_said(2, UtcTime{k_epoch + (100 + i) * k_second_ns}, at((100 + i) * k_second_ns), 0);
+  EXPECT_NEAR(static_cast<double>(base.utc_of(136 * k_second_ns).time.ns - (k_epoch + 136 * k_second_ns)), 0,
+              1e5);
   EXPECT_FALSE(base.skew());
 }
 
 TEST(TimeBase, AnotherReceiverTakesOverFromOneThatFellSilentForHalfAMinuteAndNotFromOneThatComesBack) {
-  const std::int64_t off = 999 * k_s;
+  const std::int64_t off = 999 * k_second_ns;
   const auto after_silence_of = [&](int silence_s, bool comes_back) {
     TimeBase base;
     for (int i = 0; i < 15; ++i)
-      base.receiver_said(1, UtcTime{k_epoch + (100 + i) * k_s}, at((100 + i) * k_s), 0);
+      base.receiver_said(1, UtcTime{k_epoch + (100 + i) * k_second_ns}, at((100 + i) * k_second_ns), 0);
     for (int i = 15; i < 15 + silence_s; ++i)
-      base.receiver_said(2, UtcTime{k_epoch + (100 + i) * k_s + off}, at((100 + i) * k_s), 0);
+      base.receiver_said(2, UtcTime{k_epoch + (100 + i) * k_second_ns + off}, at((100 + i) * k_second_ns), 0);
     for (int i = 15 + silence_s; comes_back && i < 30 + silence_s; ++i) {
-      base.receiver_said(1, UtcTime{k_epoch + (100 + i) * k_s}, at((100 + i) * k_s), 0);
-      base.receiver_said(2, UtcTime{k_epoch + (100 + i) * k_s + off}, at((100 + i) * k_s), 0);
+      base.receiver_said(1, UtcTime{k_epoch + (100 + i) * k_second_ns}, at((100 + i) * k_second_ns), 0);
+      base.receiver_said(2, UtcTime{k_epoch + (100 + i) * k_second_ns + off}, at((100 + i) * k_second_ns), 0);
     }
-    return (base.utc_of(200 * k_s).time.ns - (k_epoch + 200 * k_s) + k_s / 2) / k_s;
+    return (base.utc_of(200 * k_second_ns).time.ns - (k_epoch + 200 * k_second_ns) + k_second_ns / 2) /
+           k_second_ns;
   };
   EXPECT_EQ(after_silence_of(25, false), 0) << "a link that was lost for a while";
   EXPECT_EQ(after_silence_of(45, false), 999);
