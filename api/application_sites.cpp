@@ -12,6 +12,10 @@ void Application::State::check_named(SiteRule rule, const Request& request) {
   switch (rule) {
     case SiteRule::refused:
       throw_problem(403, "forbidden", "this is of the whole server; the token is bound to sites");
+    case SiteRule::own:
+      if (!current_sites().organization())
+        throw_problem(403, "forbidden", "this is of the whole server; the token is bound to sites");
+      return;
     case SiteRule::open:
     case SiteRule::stored:
       return;

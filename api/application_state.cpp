@@ -23,7 +23,7 @@ namespace anchord::api {
 Application::State::State(Deps d)
     : deps(std::move(d)),
       stores(deps.stores),
-      scoped(stores),
+      scoped(stores, deps.access.organizations()),
       seen(scoped.stores()),
       steady(*deps.steady),
       late([this](std::string_view what) { deps.log_fault("", what); }),
@@ -129,6 +129,7 @@ Application::State::State(Deps d)
                          deps.metrics_text();
                 },
                 deps.support_files},
+      organization_api{seen.organizations, deps.clock, audit},
       device_api{deps.devices, seen.measurements, stream, jobs, audit},
       mission_api{
           missions,      seen.missions, seen.measurements, seen.sites,           seen.bin,   stream, events,
@@ -136,8 +137,9 @@ Application::State::State(Deps d)
       measurement_api{seen.measurements, ingest, missions,     models, stores.exclusions, events,
                       deps.clock,        audit,  demonstration},
       anchor_answers(stores.revisions, contradictions),
-      anchor_api{seen.sites, seen.anchors, seen.calibrations, seen.revisions, seen.frames,
-                 missions,   geo,          contradictions,    deps.clock,     audit},
+      anchor_api{seen.sites,     seen.organizations, seen.anchors, seen.calibrations,
+                 seen.revisions, seen.frames,        missions,     geo,
+                 contradictions, deps.clock,         audit},
       calibration_api{calibrations,
                       seen.calibrations,
                       seen.revisions,
@@ -262,7 +264,8 @@ void Application::State::add_routes() {
   add_dataset_routes(router, learning_api);
   add_training_run_routes(router, learning_api);
   add_model_routes(router, learning_api);
-  add_access_routes(router, deps.access, stores.sites);
+  add_access_routes(router, deps.access, stores.sites, stores.organizations);
+  add_organization_routes(router, organization_api);
   add_alarm_routes(router, admin_api);
   add_backup_routes(router, admin_api);
   add_cir_archive_routes(router, admin_api);

@@ -120,6 +120,7 @@ struct Application::State {
   WebhookService webhooks;
   Audit audit;
   AdminApi admin_api;
+  OrganizationApi organization_api;
   DeviceApi device_api;
   MissionApi mission_api;
   MeasurementApi measurement_api;

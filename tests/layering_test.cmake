@@ -40,7 +40,7 @@ set(rows
   "drivers/device: core/base core/types drivers/link drivers/time drivers/record drivers/port drivers/gnss drivers/ntrip drivers/pozyx drivers/dwm1001 drivers/mapping drivers/mqtt"
   "drivers/sim: core/base core/types drivers/pozyx drivers/mavlink drivers/drone"
 
-  "api/kit: core/base core/ports"
+  "api/kit: core/base core/types core/ports"
   "api/scope: core/base core/ports api/kit"
   "api/stream: core/base api/kit"
   "api/wire: core/base core/types core/geo core/localize core/flight api/kit"
@@ -151,6 +151,7 @@ set(mutexes
   api/anchors/contradiction_watch.hpp:comparing_  # published anchors with later flights
   api/devices/device_stream.hpp:changing_         # whose the devices are: told to them and to the disk
   api/flight/flight_state.hpp:publishing_         # events of a flight, in their order
+  api/kit/organization_index.hpp:rereading_       # a site or a quota, read and noted
   api/learning/model_registry.hpp:reloading_      # the promoted models
   api/missions/mission_service_state.hpp:correcting_one  # what was declared of a mission, read and written
   api/missions/mission_service_state.hpp:reading_one  # a flight read back from the store

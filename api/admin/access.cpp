@@ -39,7 +39,25 @@ Principal principal_of(const Token& token) {
     if (const auto role = k_role_words.find(word)) who.roles.push_back(*role);
   }
   who.sites = token.sites;
+  who.requests_per_minute = token.requests_per_minute;
   return who;
+}
+
+/// Errors: invalid_argument, saying what to do.
+Result<void> check_bounds(const TokenBounds& bounds, const std::vector<std::string>& roles) {
+  const bool whole = bounds.sites.all() && !bounds.organization;
+  if (!bounds.sites.all() && bounds.organization)
+    return make_error(Errc::invalid_argument,
+                      "a token is bound to sites or to an organization: name one of the two");
+  if (!bounds.requests_per_minute) return boost::outcome_v2::success();
+  if (*bounds.requests_per_minute < 1 || *bounds.requests_per_minute > k_most_requests_per_minute)
+    return make_error(Errc::invalid_argument,
+                      "requests per minute must be 1.." + std::to_string(k_most_requests_per_minute));
+  if (whole && std::ranges::find(roles, to_string(Role::admin)) != roles.end())
+    return make_error(Errc::invalid_argument,
+                      "an admin of the whole server has no limit of requests: leave it out, or bind the "
+                      "token to sites or to an organization");
+  return boost::outcome_v2::success();
 }
 
 struct Session {
@@ -120,8 +138,9 @@ struct Notes {
 }  // namespace
 
 struct AccessService::State {
-  State(TokenStore& s, AccessStore& l, const Clock& c, AccessOptions o)
-      : store(s), log(l), clock(c), options(o) {}
+  State(const Stores& s, const Clock& c, AccessOptions o)
+      : organizations(s), store(s.tokens), log(s.access), clock(c), options(o) {}
+  OrganizationIndex organizations;
   TokenStore& store;
   AccessStore& log;
   const Clock& clock;
@@ -130,6 +149,10 @@ struct AccessService::State {
   Locked<Admitted, std::shared_mutex> admitted;  ///< never taken together with notes
   mutable Locked<Notes> notes;
 
+  /// To the sites of its organization, which the store does not know of a token.
+  void bind(Token& token) {
+    if (token.organization) token.sites = SiteSet::of(organizations.sites_of(*token.organization));
+  }
   SteadyTime steady_now() const { return options.steady->now(); }
   void note_end(Admitted& all, const std::string& key, const Token& token) const {
     if (token.expires) all.ends.try_emplace(key, later(steady_now(), token.expires->ns - clock.now().ns));
@@ -140,15 +163,18 @@ struct AccessService::State {
   }
 };
 
-AccessService::AccessService(TokenStore& tokens, AccessStore& audit, const Clock& clock,
-                             AccessOptions options)
-    : state_(std::make_unique<State>(tokens, audit, clock, options)) {}
+AccessService::AccessService(const Stores& stores, const Clock& clock, AccessOptions options)
+    : state_(std::make_unique<State>(stores, clock, options)) {}
 AccessService::~AccessService() { flush(); }
 
 const AccessOptions& AccessService::options() const { return state_->options; }
 
+OrganizationIndex& AccessService::organizations() { return state_->organizations; }
+
 Result<void> AccessService::load() {
+  BOOST_OUTCOME_TRYV(state_->organizations.load());
   BOOST_OUTCOME_TRY(auto all, state_->store.tokens());
+  for (auto& token : all) state_->bind(token);
   auto admitted = state_->admitted.lock();
   admitted->tokens.clear();
   for (auto& token : all) {
@@ -168,7 +194,7 @@ bool AccessService::has_tokens() const {
 
 Result<NewToken> AccessService::create_token(std::string_view name, const std::vector<std::string>& roles,
                                              std::optional<UtcTime> expires, const Principal& by,
-                                             std::string_view from, const SiteSet& sites) {
+                                             std::string_view from, const TokenBounds& bounds) {
   if (name.empty() || name.size() > 100)
     return make_error(Errc::invalid_argument, "the name must have 1 to 100 characters");
   if (roles.empty()) return make_error(Errc::invalid_argument, "a token needs at least one role");
@@ -177,6 +203,7 @@ Result<NewToken> AccessService::create_token(std::string_view name, const std::v
   }
   const UtcTime now = state_->clock.now();
   if (expires && *expires <= now) return make_error(Errc::invalid_argument, "the expiry is in the past");
+  BOOST_OUTCOME_TRYV(check_bounds(bounds, roles));
   const std::string secret = random_hex_256();
   NewToken made;
   made.token.id = TokenId{make_uuid_v7(now)};
@@ -185,10 +212,13 @@ Result<NewToken> AccessService::create_token(std::string_view name, const std::v
   made.token.roles = roles;
   made.token.created = now;
   made.token.expires = expires;
-  made.token.sites = sites;
+  made.token.sites = bounds.sites;
+  made.token.organization = bounds.organization;
+  made.token.requests_per_minute = bounds.requests_per_minute;
   const std::string key = without_dashes(made.token.id.uuid);
   made.text = std::string(k_prefix) + key + "_" + secret;
   BOOST_OUTCOME_TRYV(state_->store.insert(made.token));
+  state_->bind(made.token);
   {
     auto admitted = state_->admitted.lock();
     state_->note_end(*admitted, key, made.token);

@@ -10,6 +10,7 @@
 
 #include "api/admin/login_guard.hpp"
 #include "api/kit/message.hpp"
+#include "api/kit/organization_index.hpp"
 #include "core/base/result.hpp"
 #include "core/base/steady.hpp"
 #include "core/base/time.hpp"
@@ -26,6 +27,15 @@ struct AccessOptions {
   const SteadyClock* steady{&system_steady_clock()};  ///< what sessions, tickets and expiry run on
   bool auth_off{false};  ///< demonstration on loopback: everybody is `local`, with every right
 };
+
+/// What a new token is bound to: every site, `sites`, or those that an organization has now and later.
+struct TokenBounds {
+  SiteSet sites{};
+  std::optional<OrganizationId> organization{};
+  std::optional<std::uint32_t> requests_per_minute{};
+};
+/// Requests of a token, and of all tokens of an organization.
+inline constexpr std::uint32_t k_most_requests_per_minute = 1'000'000;
 
 /// A token as shown once to the person who asked for it; only its hash is kept.
 struct NewToken {
@@ -47,21 +57,22 @@ struct Login {
 /// with the process. Thread-safe.
 class AccessService {
  public:
-  AccessService(TokenStore& tokens, AccessStore& audit, const Clock& clock, AccessOptions options = {});
+  AccessService(const Stores& stores, const Clock& clock, AccessOptions options = {});
   ~AccessService();
   AccessService(const AccessService&) = delete;
   AccessService& operator=(const AccessService&) = delete;
 
-  /// Reads every token. Call before the first verify().
+  /// Reads every token and every organization. Call before the first verify().
   Result<void> load();
+  OrganizationIndex& organizations();
   bool has_tokens() const;
   const AccessOptions& options() const;
 
-  /// Roles must be known words ("viewer", ... "admin"). `sites` are not asked for here: whoever knows them
-  /// does. Errors: invalid_argument, those of the store.
+  /// Roles must be known words ("viewer", ... "admin"). Sites are not asked for here: whoever knows them
+  /// does. Errors: invalid_argument, those of the store (not_found: no such organization).
   Result<NewToken> create_token(std::string_view name, const std::vector<std::string>& roles,
                                 std::optional<UtcTime> expires, const Principal& by, std::string_view from,
-                                const SiteSet& sites = {});
+                                const TokenBounds& bounds = {});
   Result<void> revoke_token(const TokenId& id, const Principal& by, std::string_view from);
   std::vector<Token> tokens() const;
 

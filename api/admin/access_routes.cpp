@@ -7,6 +7,7 @@
 #include "api/kit/router.hpp"
 #include "api/kit/support.hpp"
 #include "core/base/to_wire.hpp"
+#include "core/ports/organization_store.hpp"
 #include "core/ports/site_store.hpp"
 
 namespace anchord::api {
@@ -47,8 +48,17 @@ std::string text_field(const json& body, const char* key, std::vector<FieldError
 json sites_json(const SiteSet& sites) {
   if (sites.all()) return nullptr;
   json out = json::array();
-  for (const auto& id : sites.sites()) out.push_back(to_string(id));
+  for (const auto& id : *sites.sites()) out.push_back(to_string(id));
   return out;
+}
+
+template <class T>
+json id_or_null(const std::optional<T>& id) {
+  return id ? json(to_string(*id)) : json(nullptr);
+}
+
+json number_or_null(const std::optional<std::uint32_t>& number) {
+  return number ? json(*number) : json(nullptr);
 }
 
 json token_json(const Token& token) {
@@ -56,6 +66,8 @@ json token_json(const Token& token) {
            {"name", token.name},
            {"roles", token.roles},
            {"sites", sites_json(token.sites)},
+           {"organization", id_or_null(token.organization)},
+           {"requests_per_minute", number_or_null(token.requests_per_minute)},
            {"created_at", to_rfc3339(token.created)}};
   const auto time = [](const std::optional<UtcTime>& t) { return t ? json(to_rfc3339(*t)) : json(nullptr); };
   out["expires_at"] = time(token.expires);
@@ -72,6 +84,8 @@ json principal_json(const Principal& who) {
           {"name", who.name},
           {"roles", roles},
           {"sites", sites_json(who.sites)},
+          {"organization", id_or_null(who.sites.organization())},
+          {"requests_per_minute", number_or_null(who.requests_per_minute)},
           {"auth", login_is_off ? "off" : "on"}};
 }
 
@@ -122,8 +136,40 @@ SiteSet read_sites(const json& body, SiteStore& known, std::vector<FieldError>& 
   return SiteSet::only(std::move(sites));
 }
 
-Response create_token(AccessService& access, SiteStore& known, const Request& request) {
-  const json body = body_of(request, {"name", "roles", "expires_at", "sites"});
+/// Absent or null: none.
+std::optional<OrganizationId> read_organization(const json& body, OrganizationStore& known,
+                                                std::vector<FieldError>& faults) {
+  const auto at = body.find("organization");
+  if (at == body.end() || at->is_null()) return std::nullopt;
+  const auto id = parse_uuid(at->is_string() ? at->get_ref<const std::string&>() : "");
+  if (!id)
+    faults.push_back({"/organization", "bad_id", id.error().message});
+  else if (!known.organization(OrganizationId{id.value()}))
+    faults.push_back({"/organization", "unknown_organization",
+                      "there is no such organization; the ids are in GET /api/v1/organizations"});
+  else if (const auto sites = body.find("sites"); sites != body.end() && !sites->is_null())
+    faults.push_back({"/organization", "conflict",
+                      "a token is bound to sites or to an organization: leave one of the two out"});
+  else
+    return OrganizationId{id.value()};
+  return std::nullopt;
+}
+
+/// Absent or null: no limit.
+std::optional<std::uint32_t> read_requests(const json& body, std::vector<FieldError>& faults) {
+  const auto at = body.find("requests_per_minute");
+  if (at == body.end() || at->is_null()) return std::nullopt;
+  const auto number = at->is_number_unsigned() ? at->get<std::uint64_t>() : 0;
+  if (number >= 1 && number <= k_most_requests_per_minute) return static_cast<std::uint32_t>(number);
+  faults.push_back({"/requests_per_minute", "out_of_range",
+                    "null, or a number of 1 to " + std::to_string(k_most_requests_per_minute)});
+  return std::nullopt;
+}
+
+Response create_token(AccessService& access, SiteStore& known, OrganizationStore& organizations,
+                      const Request& request) {
+  const json body =
+      body_of(request, {"name", "roles", "expires_at", "sites", "organization", "requests_per_minute"});
   std::vector<FieldError> faults;
   const std::string name = text_field(body, "name", faults);
   std::vector<std::string> roles;
@@ -150,11 +196,14 @@ Response create_token(AccessService& access, SiteStore& known, const Request& re
       faults.push_back({"/expires_at", "format", "a UTC time like 2027-01-31T00:00:00Z"});
     }
   }
-  const SiteSet sites = read_sites(body, known, faults);
+  TokenBounds bounds;
+  bounds.sites = read_sites(body, known, faults);
+  bounds.organization = read_organization(body, organizations, faults);
+  bounds.requests_per_minute = read_requests(body, faults);
   if (!faults.empty())
     throw_problem(422, "validation", std::to_string(faults.size()) + " fields are wrong", faults);
   const auto made =
-      value_or_problem(access.create_token(name, roles, expires, request.principal, request.remote, sites));
+      value_or_problem(access.create_token(name, roles, expires, request.principal, request.remote, bounds));
   json out = token_json(made.token);
   out["token"] = made.text;  // the only time it is shown
   auto response = answer(201, out);
@@ -207,12 +256,15 @@ Response logout(AccessService& access, const Request& request) {
 
 }  // namespace
 
-void add_access_routes(Router& router, AccessService& access, SiteStore& sites) {
+void add_access_routes(Router& router, AccessService& access, SiteStore& sites,
+                       OrganizationStore& organizations) {
   using enum Method;
   const auto admin = Access::any_of({Role::admin});
   router.add({get, "/api/v1/tokens", admin, [&access](const Request& r) { return list_tokens(access, r); }});
-  router.add(keeps_nothing({post, "/api/v1/tokens", admin,
-                            [&access, &sites](const Request& r) { return create_token(access, sites, r); }}));
+  router.add(
+      keeps_nothing({post, "/api/v1/tokens", admin, [&access, &sites, &organizations](const Request& r) {
+                       return create_token(access, sites, organizations, r);
+                     }}));
   router.add(
       {del, "/api/v1/tokens/{id}", admin, [&access](const Request& r) { return revoke_token(access, r); }});
   router.add(keeps_nothing({post, "/api/v1/session", Access::open(),

@@ -204,7 +204,7 @@ Result<Job> JobService::submit(std::string kind, std::string request_json, Work 
     };
     auto now = state_->lanes.lock();
     if (now->for_sites.size() >= k_max_for_sites) now->for_sites.erase(now->for_sites.begin());  // the oldest
-    now->for_sites.emplace(job.id, current_sites());
+    now->for_sites.emplace(job.id, current_sites().as_of_now());
   }
   state_->enqueue(state_, job, std::move(work));
   return job;
@@ -215,8 +215,10 @@ bool JobService::seen(const JobId& id) const {
   if (sites.all()) return true;
   const auto now = state_->lanes.lock();
   const auto at = now->for_sites.find(id);
-  return at != now->for_sites.end() &&
-         std::ranges::all_of(at->second.sites(), [&](const SiteId& site) { return sites.holds(site); });
+  if (at == now->for_sites.end()) return false;
+  // Of an organization: of the sites that it had then, all of which it must still have.
+  const SiteList then = at->second.sites(), own = sites.sites();
+  return then == own || (!then->empty() && std::ranges::includes(*own, *then));
 }
 
 Result<Job> JobService::restart(const JobId& id, Work work) {

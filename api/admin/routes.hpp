@@ -17,6 +17,7 @@ class AccessStore;
 class Backups;
 class Clock;
 class JobStore;
+class OrganizationStore;
 class SiteStore;
 struct Job;
 }  // namespace anchord
@@ -59,14 +60,23 @@ struct AdminApi {
   std::function<std::vector<std::pair<std::string, std::string>>()> support_files;
 };
 
+/// What the routes of organizations work with.
+struct OrganizationApi {
+  OrganizationStore& organizations;
+  const Clock& clock;
+  Audit audit;
+};
+
 /// Begins a backup in a job. Errors: those of the job queue.
 Result<Job> begin_backup(const AdminApi& admin);
 
 /// /api/v1/tokens, /session, /me, /ws-tickets.
-void add_access_routes(Router& router, AccessService& access, SiteStore& sites);
+void add_access_routes(Router& router, AccessService& access, SiteStore& sites,
+                       OrganizationStore& organizations);
 void add_alarm_routes(Router& router, AdminApi& admin);
 void add_backup_routes(Router& router, AdminApi& admin);
 void add_cir_archive_routes(Router& router, AdminApi& admin);
+void add_organization_routes(Router& router, OrganizationApi& organizations);
 void add_job_routes(Router& router, AdminApi& admin);
 void add_system_routes(Router& router, AdminApi& admin);
 

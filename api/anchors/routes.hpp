@@ -12,6 +12,7 @@ class AnchorStore;
 class CalibrationStore;
 class Clock;
 class FrameStore;
+class OrganizationStore;
 class RevisionStore;
 class SiteStore;
 }  // namespace anchord
@@ -27,6 +28,7 @@ class Router;
 /// What the routes of anchors, sites and local frames work with; lives as long as the router.
 struct AnchorApi {
   SiteStore& sites;
+  OrganizationStore& organizations;
   AnchorStore& anchors;
   CalibrationStore& calibrations;
   RevisionStore& revisions;

@@ -40,6 +40,7 @@ Ordered site_json(const Site& site) {
                  {{"source", site.base_source.empty() ? Ordered(nullptr) : Ordered(site.base_source)},
                   {"sigma_m", or_null(site.base_sigma_m)}}}};
   out["projected_epsg"] = or_null(site.projected_epsg);
+  out["organization"] = site.organization ? Ordered(to_string(*site.organization)) : Ordered(nullptr);
   out["created_at"] = to_rfc3339(site.created);
   return out;
 }
@@ -86,6 +87,15 @@ void patch_site(const Json& body, bool whole, Site& site, std::vector<FieldError
     site.projected_epsg = static_cast<int>(*epsg);
   else if (cleared("projected_epsg"))
     site.projected_epsg.reset();
+  if (const auto text = fields.text("organization", 36)) {
+    const auto id = parse_uuid(*text);
+    if (id)
+      site.organization = OrganizationId{id.value()};
+    else
+      fields.error("organization", "bad_id", id.error().message);
+  } else if (cleared("organization")) {
+    site.organization.reset();
+  }
   fields.finish();
 }
 

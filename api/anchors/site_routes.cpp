@@ -1,17 +1,17 @@
-#include <limits>
 #include <nlohmann/json.hpp>
 
 #include "api/anchors/geo_service.hpp"
 #include "api/anchors/routes.hpp"
 #include "api/anchors/site_json.hpp"
+#include "api/kit/current_sites.hpp"
 #include "api/kit/id_page.hpp"
+#include "api/kit/quota_json.hpp"
 #include "api/kit/reader.hpp"
 #include "api/kit/support.hpp"
+#include "core/ports/organization_store.hpp"
 #include "core/ports/site_store.hpp"
 
 namespace anchord::api {
-
-using Ordered = nlohmann::ordered_json;
 
 namespace {
 
@@ -24,10 +24,13 @@ Response answer(int status, const Site& site) {
 }
 
 Response list(AnchorApi& s, const Request& request) {
-  check_query(request, {"limit", "cursor", "fields"});
+  check_query(request, {"limit", "cursor", "fields", "organization"});
+  const auto organization = cursor_id<OrganizationId>(request.query_value("organization").value_or(""));
   return id_page<SiteId>(
       request,
-      [&](std::size_t limit, const std::optional<SiteId>& after) { return s.sites.sites(limit, after); },
+      [&](std::size_t limit, const std::optional<SiteId>& after) {
+        return s.sites.sites(limit, after, organization);
+      },
       [&](const auto& site) { return site_json(site); });
 }
 
@@ -41,11 +44,23 @@ void check_map(GeoService& geo, const Site& site, std::vector<FieldError>& error
   errors.push_back({"/projected_epsg", "not_usable", map ? map.value()->unusable() : map.error().message});
 }
 
+void check_organization(AnchorApi& s, const Site& site, std::vector<FieldError>& errors) {
+  if (site.organization && !s.organizations.organization(*site.organization))
+    errors.push_back({"/organization", "unknown_organization",
+                      "there is no such organization; the ids are in GET /api/v1/organizations"});
+}
+
+std::string organization_words(const Site& site) {
+  return site.organization ? to_string(*site.organization) : "none";
+}
+
 Response create(AnchorApi& s, const Request& request) {
   std::vector<FieldError> errors;
   Site site;
   patch_site(json_body(request), true, site, errors);
   if (site.projected_epsg) check_map(s.geo, site, errors);
+  if (!site.organization) site.organization = current_sites().organization();
+  check_organization(s, site, errors);
   refuse_if_any(errors);
   site.created = s.clock.now();
   site.id.uuid = make_uuid_v7(site.created);
@@ -60,13 +75,23 @@ Response patch(AnchorApi& s, const Request& request) {
   Site site = value_or_problem(s.sites.site(path_id<SiteId>(request)));
   require_match(request, etag(site));
   std::vector<FieldError> errors;
-  const auto before = site.projected_epsg;
+  const Site before = site;
   patch_site(json_body(request), false, site, errors);
-  if (site.projected_epsg && site.projected_epsg != before) check_map(s.geo, site, errors);
+  if (site.projected_epsg && site.projected_epsg != before.projected_epsg) check_map(s.geo, site, errors);
+  if (site.organization != before.organization) {
+    if (!current_sites().all())
+      throw_problem(403, "forbidden",
+                    "only an admin token of the whole server gives a site to another organization");
+    check_organization(s, site, errors);
+  }
   refuse_if_any(errors);
   value_or_problem(s.sites.update(site, site.version));
   ++site.version;
-  s.audit(request, "site.change " + to_string(site.id));
+  s.audit(request,
+          "site.change " + to_string(site.id) +
+              (site.organization == before.organization
+                   ? ""
+                   : " organization: " + organization_words(before) + " -> " + organization_words(site)));
   return answer(200, site);
 }
 
@@ -80,33 +105,13 @@ Response remove(AnchorApi& s, const Request& request) {
   return response;
 }
 
-Ordered quota_json(const SiteQuota& quota) {
-  Ordered limits = Ordered::object(), used = Ordered::object(), reached = Ordered::array();
-  for (std::size_t i = 0; i < k_quota_kinds; ++i) {
-    const auto kind = static_cast<QuotaKind>(i);
-    const std::string word(k_quota_kind_words.word(kind));
-    limits[word] = quota.limits[i] ? Ordered(*quota.limits[i]) : Ordered(nullptr);
-    used[word] = quota.used[i];
-    if (quota.reached(kind)) reached.push_back(word);
-  }
-  return {{"limits", std::move(limits)}, {"used", std::move(used)}, {"reached", std::move(reached)}};
-}
-
-/// All of them are named: a limit that was forgotten would be none.
 Response limit(AnchorApi& s, const Request& request) {
   const auto site = path_id<SiteId>(request);
   const auto body = json_body(request);
   std::vector<FieldError> errors;
   Fields fields(body, "", errors);
-  SiteLimits limits;
   std::string words;
-  for (std::size_t i = 0; i < k_quota_kinds; ++i) {
-    const std::string word(k_quota_kind_words.word(static_cast<QuotaKind>(i)));
-    if (fields.is_object() && !body.contains(word))
-      fields.error(word, "required", "must be a number, or null for no limit");
-    limits[i] = fields.integer(word, 0, std::numeric_limits<std::int64_t>::max());
-    words += ' ' + word + ' ' + (limits[i] ? std::to_string(*limits[i]) : "none");
-  }
+  const SiteLimits limits = quota_limits<k_quota_kinds>(fields, words);
   fields.finish();
   refuse_if_any(errors);
   value_or_problem(s.sites.set_limits(site, limits));

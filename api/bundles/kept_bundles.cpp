@@ -51,8 +51,8 @@ std::string key_of(const Request& request) {
   const auto& who = request.principal;
   std::string text = request.path + '\n' + request.query_value("flights").value_or("true") + '\n';
   for (const auto role : who.roles) text += std::string(to_string(role)) + ' ';
-  if (!who.sites.all())
-    for (const auto& site : who.sites.sites()) text += "\n" + to_string(site);
+  if (const SiteList list = who.sites.sites())
+    for (const auto& site : *list) text += "\n" + to_string(site);
   return hex_of(who.token_id, k_token_digits) + '-' + hex_of(who.token_id + '\n' + text, k_request_digits) +
          '-';
 }

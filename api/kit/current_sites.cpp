@@ -18,8 +18,9 @@ const SiteSet& current_sites() { return of_this_thread(); }
 
 std::optional<SiteId> named_or_own(const std::optional<SiteId>& site) {
   const SiteSet& sites = current_sites();
-  if (site || sites.all() || sites.sites().size() != 1) return site;
-  return sites.sites().front();
+  if (site || sites.all()) return site;
+  const SiteList list = sites.sites();
+  return list->size() == 1 ? std::optional(list->front()) : site;
 }
 
 ForSites::ForSites(SiteSet sites) : before_(std::exchange(of_this_thread(), std::move(sites))) {}

@@ -42,7 +42,8 @@ struct Principal {
   std::string token_id;  ///< for the audit log; "local" with --auth=off
   std::string name;
   std::vector<Role> roles;
-  SiteSet sites{};  ///< what the token is bound to
+  SiteSet sites{};                                     ///< what the token is bound to
+  std::optional<std::uint32_t> requests_per_minute{};  ///< of the token alone, at most
   bool has(Role role) const {
     for (const Role r : roles) {
       if (r == role) return true;

@@ -291,6 +291,11 @@ const std::string* Fields::one_of(std::string_view key, std::span<const std::str
   return nullptr;
 }
 
+void Fields::must_be_named(std::string_view key) {
+  if (object_ != nullptr && !object_->contains(key))
+    error(key, "required", "must be a number, or null for no limit");
+}
+
 void Fields::error(std::string_view key, std::string code, std::string detail) {
   errors_.push_back({pointer(key), std::move(code), std::move(detail)});
 }

@@ -58,6 +58,8 @@ class Fields {
     return word == nullptr ? std::nullopt : std::optional(*word);
   }
 
+  /// Of a field where null says something, and leaving it out does not say the same.
+  void must_be_named(std::string_view key);
   void error(std::string_view key, std::string code, std::string detail);
   void finish();
 

@@ -8,6 +8,7 @@
 #include "api/kit/problem.hpp"
 #include "core/base/check.hpp"
 #include "core/base/guard.hpp"
+#include "core/base/ids.hpp"
 #include "core/base/text.hpp"
 
 namespace anchord::api {
@@ -105,6 +106,15 @@ void complete_problem(const Request& request, Response& response) {
   append_json_text(response.body += ",\"instance\":", request.path);
   append_json_text(response.body += ",\"request_id\":", request.request_id);
   response.body += '}';
+}
+
+/// "/api/v1/missions/ID" of what is below it; empty where the path names no id there.
+std::string resource_of(std::string_view path) {
+  const Segments cut(path);
+  if (cut.count < 4 || cut.too_many() || !parse_uuid(cut.parts[3])) return {};
+  std::string out;
+  for (std::size_t i = 0; i < 4; ++i) (out += '/') += cut.parts[i];
+  return out;
 }
 
 }  // namespace
@@ -209,6 +219,34 @@ Response Router::refuse(const Resolution& resolution, const Request& request) co
   return response;
 }
 
+/// What was kept for a token of an organization may be of a site that has left it since: then what the
+/// request and its answer name is not there any more.
+void Router::forget_what_left(const Request& request, Response& response) const {
+  if (!request.principal.sites.organization()) return;
+  std::string made;
+  bool kept = false;
+  for (const auto& [name, value] : response.headers) {
+    if (name == "Location") made = value;
+    kept |= name == "Idempotent-Replayed";
+  }
+  if (!kept) return;
+  for (const std::string& path : {made, resource_of(request.path)}) {
+    if (path.empty()) continue;
+    auto found = resolve(Method::get, path);
+    if (found.kind != Resolution::Kind::matched) continue;
+    Request ask;
+    ask.method = Method::get;
+    ask.path = path;
+    ask.params = std::move(found.params);
+    ask.principal = request.principal;
+    ask.request_id = request.request_id;
+    Response there = dispatch(*found.route, ask);
+    if (there.status != 404) continue;
+    response = std::move(there);
+    return;
+  }
+}
+
 Response Router::handle(Request& request) const {
   auto resolution = resolve(request.method, request.path);
   if (resolution.kind != Resolution::Kind::matched) return refuse(resolution, request);
@@ -245,6 +283,7 @@ Response Router::dispatch(const Route& route, Request& request) const {
                !is_dry_run(request) && !request.header("idempotency-key").empty()) {
       const bool prompt = route.work_for(request) == Work::command;
       response = (prompt ? state_->of_commands : state_->idempotency)->run(request, route.keeps, handled);
+      forget_what_left(request, response);
     } else {
       response = handled(request);
     }

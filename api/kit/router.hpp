@@ -128,6 +128,7 @@ class Router {
   void on_fault(std::function<void(std::string_view request_id, std::string_view what)> log);
 
  private:
+  void forget_what_left(const Request& request, Response& response) const;
   struct State;
   std::unique_ptr<State> state_;
 };

@@ -67,7 +67,7 @@ void MqttPublisher::alarms(Messages& out) {
 }
 
 void MqttPublisher::name_sites() {
-  const auto sites = deps_.sites.sites(k_most_sites, {});
+  const auto sites = deps_.sites.sites(k_most_sites, {}, {});
   if (!sites) return;
   levels_.clear();
   std::set<std::string> taken;

@@ -24,6 +24,7 @@ enum class SiteRule : std::uint8_t {
   stored,   ///< what it names and lists is read and written through ScopedStores, which holds it to the sites
   mission,  ///< {id} is a mission, which must be of the sites; what else it names is stored
   asked,    ///< ?mission= must be there; it is stored
+  own,      ///< who is bound to an organization makes and removes sites of it; of sites that are named, 403
   own_job,  ///< a job that a token of these sites submitted
   refused,  ///< it is of the whole server: 403
 };

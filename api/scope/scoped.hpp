@@ -12,6 +12,8 @@ namespace anchord::api {
 
 // What the scoped stores share, and the makers of them.
 
+class OrganizationIndex;
+
 /// As the stores say that there is no such row.
 template <class I>
 Error absent(std::string_view what, const I& id) {
@@ -21,7 +23,8 @@ Error absent(std::string_view what, const I& id) {
 /// Why something may not be written without a site, or with one that is not of the token's.
 Error elsewhere(std::string_view what);
 
-std::unique_ptr<SiteStore> scoped_sites(SiteStore& all);
+std::unique_ptr<SiteStore> scoped_sites(SiteStore& all, OrganizationIndex& index);
+std::unique_ptr<OrganizationStore> scoped_organizations(OrganizationStore& all, OrganizationIndex& index);
 std::unique_ptr<PlanStore> scoped_plans(PlanStore& all);
 std::unique_ptr<FrameStore> scoped_frames(FrameStore& all);
 std::unique_ptr<PlaceStore> scoped_places(PlaceStore& all);

@@ -1,6 +1,8 @@
 // Sites, and what is drawn and planned at them.
+#include <algorithm>
 #include <map>
 
+#include "api/kit/organization_index.hpp"
 #include "api/scope/scoped.hpp"
 #include "core/ports/frame_store.hpp"
 #include "core/ports/place_store.hpp"
@@ -16,35 +18,48 @@ constexpr auto k_of_sites = [](const auto& row) -> Result<bool> { return current
 
 class ScopedSites final : public SiteStore {
  public:
-  explicit ScopedSites(SiteStore& all) : all_(all) {}
+  ScopedSites(SiteStore& all, OrganizationIndex& index) : all_(all), index_(index) {}
+  /// Who is bound to an organization makes sites of it.
   Result<void> insert(const Site& site) override {
-    if (!current_sites().holds(site.id)) return elsewhere("a new site");
-    return all_.insert(site);
+    const auto own = current_sites().organization();
+    if (!current_sites().all() && !(own && site.organization == own)) return elsewhere("a new site");
+    BOOST_OUTCOME_TRYV(all_.insert(site));
+    index_.site_changed(site.id);
+    return boost::outcome_v2::success();
   }
   Result<void> update(const Site& site, std::uint64_t expected_version) override {
-    if (!current_sites().holds(site.id)) return absent("site", site.id);
-    return all_.update(site, expected_version);
+    if (!current_sites().all()) {
+      BOOST_OUTCOME_TRY(const auto before, this->site(site.id));
+      if (before.organization != site.organization) return elsewhere("/organization of the site");
+    }
+    BOOST_OUTCOME_TRYV(all_.update(site, expected_version));
+    index_.site_changed(site.id);
+    return boost::outcome_v2::success();
   }
   Result<Site> site(const SiteId& id) override {
     if (!current_sites().holds(id)) return absent("site", id);
     return all_.site(id);
   }
-  Result<std::vector<Site>> sites(std::size_t limit, const std::optional<SiteId>& after) override {
-    if (current_sites().all()) return all_.sites(limit, after);
-    // Named by the token: read one by one, in the order of the list.
+  Result<std::vector<Site>> sites(std::size_t limit, const std::optional<SiteId>& after,
+                                  const std::optional<OrganizationId>& organization) override {
+    if (current_sites().all()) return all_.sites(limit, after, organization);
+    // Named by the token or its organization: read one by one, in the order of the list.
     std::vector<Site> out;
-    for (const auto& id : current_sites().sites()) {
-      if (out.size() == limit) break;
-      if (after && id <= *after) continue;
-      auto found = all_.site(id);
+    const SiteList list = current_sites().sites();
+    for (auto at = after ? std::upper_bound(list->begin(), list->end(), *after) : list->begin();
+         at != list->end() && out.size() < limit; ++at) {
+      auto found = all_.site(*at);
       BOOST_OUTCOME_TRY(const bool there, is_there(found));
-      if (there) out.push_back(std::move(found).value());
+      if (there && (!organization || found.value().organization == organization))
+        out.push_back(std::move(found).value());
     }
     return out;
   }
   Result<void> remove(const SiteId& id, std::uint64_t expected_version) override {
     if (!current_sites().holds(id)) return absent("site", id);
-    return all_.remove(id, expected_version);
+    BOOST_OUTCOME_TRYV(all_.remove(id, expected_version));
+    index_.site_changed(id);
+    return boost::outcome_v2::success();
   }
   Result<SiteQuota> quota(const SiteId& id) override {
     if (!current_sites().holds(id)) return absent("site", id);
@@ -57,6 +72,7 @@ class ScopedSites final : public SiteStore {
 
  private:
   SiteStore& all_;
+  OrganizationIndex& index_;
 };
 
 class ScopedPlans final : public PlanStore {
@@ -238,7 +254,9 @@ class ScopedPlaces final : public PlaceStore {
 
 }  // namespace
 
-std::unique_ptr<SiteStore> scoped_sites(SiteStore& all) { return std::make_unique<ScopedSites>(all); }
+std::unique_ptr<SiteStore> scoped_sites(SiteStore& all, OrganizationIndex& index) {
+  return std::make_unique<ScopedSites>(all, index);
+}
 std::unique_ptr<PlanStore> scoped_plans(PlanStore& all) { return std::make_unique<ScopedPlans>(all); }
 std::unique_ptr<FrameStore> scoped_frames(FrameStore& all) { return std::make_unique<ScopedFrames>(all); }
 std::unique_ptr<PlaceStore> scoped_places(PlaceStore& all) { return std::make_unique<ScopedPlaces>(all); }

@@ -8,6 +8,7 @@
 #include "core/ports/measurement_store.hpp"
 #include "core/ports/mission_bin.hpp"
 #include "core/ports/mission_store.hpp"
+#include "core/ports/organization_store.hpp"
 #include "core/ports/place_store.hpp"
 #include "core/ports/plan_store.hpp"
 #include "core/ports/revision_store.hpp"
@@ -16,13 +17,16 @@
 namespace anchord::api {
 
 Error elsewhere(std::string_view what) {
-  return make_error(Errc::invalid_argument,
-                    std::string(what) + ": this token is bound to sites: name one of them");
+  return make_error(
+      Errc::invalid_argument,
+      std::string(what) + (current_sites().organization()
+                               ? ": this token is bound to an organization: name one of its sites"
+                               : ": this token is bound to sites: name one of them"));
 }
 
 struct ScopedStores::State {
-  explicit State(const Stores& all)
-      : sites(scoped_sites(all.sites)),
+  State(const Stores& all, OrganizationIndex& index)
+      : sites(scoped_sites(all.sites, index)),
         plans(scoped_plans(all.plans)),
         frames(scoped_frames(all.frames)),
         places(scoped_places(all.places)),
@@ -33,12 +37,13 @@ struct ScopedStores::State {
         calibrations(scoped_calibrations(all.calibrations, *missions)),
         revisions(scoped_revisions(all.revisions, *anchors)),
         bundles(scoped_bundles(all, *missions, *calibrations, *places)),
+        organizations(scoped_organizations(all.organizations, index)),
         stores{
             *measurements, *missions,     *bin,          all.exclusions, all.events,        all.procedure_log,
             *sites,        *anchors,      *calibrations, *revisions,     all.kits,          *frames,
             *plans,        all.campaigns, all.labels,    all.datasets,   all.training_runs, all.models,
             all.jobs,      all.tokens,    all.access,    all.service,    all.webhooks,      *places,
-            *bundles} {}
+            *bundles,      *organizations} {}
 
   const std::unique_ptr<SiteStore> sites;
   const std::unique_ptr<PlanStore> plans;
@@ -51,10 +56,12 @@ struct ScopedStores::State {
   const std::unique_ptr<CalibrationStore> calibrations;
   const std::unique_ptr<RevisionStore> revisions;
   const std::unique_ptr<BundleStore> bundles;
+  const std::unique_ptr<OrganizationStore> organizations;
   const Stores stores;
 };
 
-ScopedStores::ScopedStores(const Stores& all) : state_(std::make_unique<State>(all)) {}
+ScopedStores::ScopedStores(const Stores& all, OrganizationIndex& index)
+    : state_(std::make_unique<State>(all, index)) {}
 ScopedStores::~ScopedStores() = default;
 
 const Stores& ScopedStores::stores() const { return state_->stores; }

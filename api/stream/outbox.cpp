@@ -218,7 +218,8 @@ std::shared_ptr<const std::string> Outbox::take_state(Queue& queue) {
   for (auto& [key, pending] : queue.newest) {
     seq = std::max(seq, pending.seq);
     t_us = std::max(t_us, pending.t_us);
-    elements.push_back(std::move(pending.element));
+    // Asked again: the site may have left the client's organization while this waited.
+    if (subscription.wants(pending.element)) elements.push_back(subscription.seen(pending.element));
   }
   if (subscription.deltas) {
     to_deltas(queue, elements);

@@ -18,6 +18,7 @@ class MeasurementStore;
 class MissionBin;
 class MissionStore;
 class ModelStore;
+class OrganizationStore;
 class PlaceStore;
 class PlanStore;
 class ProcedureLog;
@@ -55,6 +56,7 @@ struct Stores {
   WebhookStore& webhooks;
   PlaceStore& places;
   BundleStore& bundles;
+  OrganizationStore& organizations;
 };
 
 }  // namespace anchord

@@ -1,11 +1,13 @@
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "core/base/ids.hpp"
+#include "core/base/organization_id.hpp"
 #include "core/base/result.hpp"
 #include "core/base/site_set.hpp"
 #include "core/base/time.hpp"
@@ -20,12 +22,15 @@ struct Token {
   std::vector<std::string> roles;
   UtcTime created{};
   std::optional<UtcTime> expires{}, revoked{}, last_used{};
-  SiteSet sites{};  ///< what it is bound to
+  SiteSet sites{};  ///< what it is bound to; as stored, none where it is bound to an organization
+  std::optional<OrganizationId> organization{};  ///< to whose sites, those of later too, it is bound instead
+  std::optional<std::uint32_t> requests_per_minute{};  ///< at most; nothing: no limit of its own
 };
 
 class TokenStore {
  public:
   virtual ~TokenStore() = default;
+  /// errors: not_found where its organization is not there, conflict
   virtual Result<void> insert(const Token& token) = 0;
   virtual Result<Token> token(const TokenId& id) = 0;
   virtual Result<Token> token_by_secret(std::string_view secret_sha256_hex) = 0;

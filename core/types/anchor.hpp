@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "core/base/ids.hpp"
+#include "core/base/organization_id.hpp"
 #include "core/base/time.hpp"
 #include "core/types/document.hpp"
 #include "core/types/estimate.hpp"
@@ -15,6 +16,7 @@ namespace anchord {
 /// A place on earth with its own origin and outline.
 struct Site {
   SiteId id{};
+  std::optional<OrganizationId> organization{};  ///< of whose customers it is one
   std::string name;
   std::optional<Wgs84> origin{};  ///< of the ENU frame; absent: the first fixed position of its first mission
   GeoRings outline;               ///< of the building; empty: none

@@ -481,8 +481,7 @@ Result<std::unique_ptr<App>> App::start(const Config& config, std::function<std:
   s.metrics = std::make_unique<Metrics>(ANCHORD_VERSION);
   api::AccessOptions access_options;
   access_options.auth_off = config.text("auth") == "off";
-  s.access = std::make_unique<api::AccessService>(s.database->stores().tokens, s.database->stores().access,
-                                                  s.clock, access_options);
+  s.access = std::make_unique<api::AccessService>(s.database->stores(), s.clock, access_options);
   BOOST_OUTCOME_TRYV(s.access->load());
   BOOST_OUTCOME_TRYV(s.first_token());
   BOOST_OUTCOME_TRY(s.model_key, read_or_make_model_key(s.data_dir));

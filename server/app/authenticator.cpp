@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 
 #include "api/kit/problem.hpp"
 #include "core/base/base64.hpp"
@@ -65,6 +66,34 @@ std::string credential(std::string_view authorization) {
   return colon == std::string::npos ? std::string{} : decoded->substr(colon + 1);
 }
 
+/// What no quota of requests refuses: measurements and flights that come in, what keeps an aircraft safe, and
+/// the live picture of who flies it. All of it has limits of its own.
+bool needed_in_flight(const api::Request& request, const api::Resolution& found) {
+  if (request.path == k_live_path) return true;
+  if (found.kind != api::Resolution::Kind::matched) return false;
+  const api::Route& route = *found.route;
+  return route.streams_body || route.keeps == api::Keeps::always || route.work == api::Work::command ||
+         route.work == api::Work::flight || route.pattern.starts_with("/api/v1/bundles");
+}
+
+/// Instead of what every refusal of its status says.
+void retry_after(api::Response& response, int wait_s) {
+  std::erase_if(response.headers, [](const auto& header) { return header.first == "Retry-After"; });
+  response.header("Retry-After", std::to_string(wait_s));
+}
+
+/// 429 with what was asked too often (IETF draft-ietf-httpapi-ratelimit-headers-10).
+api::Response too_many(std::string detail, const std::string& policy, const Rate& rate, int wait_s) {
+  auto response = api::problem(429, "rate-limited", std::move(detail));
+  const auto whole = [](double n) { return std::to_string(std::max(1L, std::lround(n))); };
+  retry_after(response, wait_s);
+  response
+      .header("RateLimit-Policy",
+              '"' + policy + "\";q=" + whole(rate.burst) + ";w=" + whole(rate.burst / rate.per_s))
+      .header("RateLimit", '"' + policy + "\";r=0;t=" + std::to_string(wait_s));
+  return response;
+}
+
 }  // namespace
 
 Authenticator::Authenticator(const api::Router& router, api::WsHandlerFactory live, api::TokenWsFactory omlox,
@@ -75,7 +104,6 @@ Authenticator::Authenticator(const api::Router& router, api::WsHandlerFactory li
       access_(access),
       metrics_(metrics),
       options_(std::move(options)),
-      rate_(options_.rate_per_s, options_.rate_burst),
       places_(options_.places),
       strangers_(k_strangers) {}
 
@@ -87,7 +115,7 @@ api::Response Authenticator::wrong_secret(const api::Request& request, std::stri
   auto response = problem(429, "rate-limited",
                           "too many wrong tokens from " + request.remote + "; wait " +
                               std::to_string(*wait_s) + " s (a valid one is accepted at once)");
-  response.header("Retry-After", std::to_string(*wait_s));
+  retry_after(response, *wait_s);
   return response;
 }
 
@@ -148,11 +176,37 @@ std::optional<api::Response> Authenticator::limit(const api::Request& request, c
   const bool change = found.kind == api::Resolution::Kind::matched && unsafe(request.method);
   if (change && (found.route->work_of || found.route->work == api::Work::command)) name += " commands";
   if (change && found.route->pattern == "/api/v1/session") name += " logins";
-  const auto wait_s = rate_.take(name, RateLimit::Clock::now());
-  if (!wait_s) return std::nullopt;
-  auto response = problem(429, "rate-limited", "too many requests");
-  response.header("Retry-After", std::to_string(*wait_s));
-  return response;
+  const Rate rate{options_.rate_per_s, options_.rate_burst};
+  if (const auto wait_s = rate_.take(name, rate, RateLimit::Clock::now()))
+    return too_many("too many requests", "server", rate, *wait_s);
+  return quota(request, found);
+}
+
+/// Of one token and of all tokens of an organization, so that a customer's script takes no other's share. An
+/// admin of the whole server has none: it is who raises them.
+std::optional<api::Response> Authenticator::quota(const api::Request& request, const api::Resolution& found) {
+  const api::Principal& who = request.principal;
+  if (needed_in_flight(request, found)) return std::nullopt;
+  const auto now = RateLimit::Clock::now();
+  if (who.requests_per_minute) {
+    const Rate rate = Rate::per_minute(*who.requests_per_minute);
+    if (const auto wait_s = quotas_.take(who.token_id, rate, now))
+      return too_many("this token may ask " + std::to_string(*who.requests_per_minute) +
+                          " times a minute: wait, or have an administrator make another token",
+                      "token", rate, *wait_s);
+  }
+  const auto organization = who.sites.organization();
+  const auto most = organization ? access_.organizations().requests_per_minute(*organization) : std::nullopt;
+  if (!most) return std::nullopt;
+  const Rate rate = Rate::per_minute(*most);
+  const std::string id = to_string(*organization);
+  if (const auto wait_s = quotas_.take("organization " + id, rate, now))
+    return too_many("the tokens of organization " + id + " may ask " + std::to_string(*most) +
+                        " times a minute together: wait, or have an administrator raise it (PUT "
+                        "/api/v1/organizations/" +
+                        id + "/quota)",
+                    "organization", rate, *wait_s);
+  return std::nullopt;
 }
 
 namespace {
@@ -328,7 +382,7 @@ Admission Authenticator::decide(api::Request& request, std::string_view host, bo
   request.remote = options_.proxies.client(request.remote, request.header("x-forwarded-for"));
   if (closed_) {
     auto response = problem(503, "overloaded", "the server is stopping");
-    response.header("Retry-After", "5");
+    retry_after(response, 5);
     return refused(std::move(response));
   }
   if ((websocket || unsafe(request.method)) &&

@@ -47,6 +47,7 @@ class Authenticator final : public Gateway {
   std::optional<api::Response> identify(api::Request& request, bool websocket, api::Login& login);
   api::Response wrong_secret(const api::Request& request, std::string_view secret, std::string_view what);
   std::optional<api::Response> limit(const api::Request& request, const api::Resolution& found);
+  std::optional<api::Response> quota(const api::Request& request, const api::Resolution& found);
   Admission live(api::Request& request, bool websocket, api::Login login);
   Admission live_omlox(const api::Request& request, bool websocket, const api::Login& login);
   /// Whether this login stands; holds its place among the live connections for as long as it is kept.
@@ -64,7 +65,7 @@ class Authenticator final : public Gateway {
   api::AccessService& access_;
   Metrics& metrics_;
   AuthenticatorOptions options_;
-  RateLimit rate_;
+  RateLimit rate_, quotas_;
   WsPlaces places_;
   WsPlaces strangers_;  ///< whose token is still to come
   std::atomic<bool> closed_{false};

@@ -4,6 +4,7 @@
 #include "api/admin/access.hpp"
 #include "api/measurements/flight_requests.hpp"
 #include "core/base/text.hpp"
+#include "core/ports/organization_store.hpp"
 #include "core/ports/site_store.hpp"
 #include "server/cli/commands.hpp"
 #include "server/cli/config_flags.hpp"
@@ -17,8 +18,9 @@ namespace anchord::cli {
 namespace {
 
 struct Options {
-  std::string data_dir{"anchord-data"}, database, url, name, expires, id;
+  std::string data_dir{"anchord-data"}, database, url, name, expires, id, organization;
   std::vector<std::string> roles, sites;
+  std::optional<std::uint32_t> requests_per_minute;
 };
 
 /// "365d", "12h", or a UTC time. Errors: invalid_argument.
@@ -80,7 +82,7 @@ int with_folder(const Options& options, Act act) {
   auto database = open_store(options.database, storage);
   if (!database) return fail(database.error().message);
   const SystemClock clock;
-  api::AccessService access(database.value()->stores().tokens, database.value()->stores().access, clock);
+  api::AccessService access(database.value()->stores(), clock);
   if (const auto loaded = access.load(); !loaded) return fail(loaded.error().message);
   return act(access, *database.value());
 }
@@ -99,6 +101,21 @@ Result<SiteSet> sites_of(const std::vector<std::string>& texts, SiteStore& known
   return SiteSet::only(std::move(sites));
 }
 
+/// Errors: invalid_argument where there is no such site or organization.
+Result<api::TokenBounds> bounds_of(const Options& options, const Stores& known) {
+  api::TokenBounds out;
+  BOOST_OUTCOME_TRY(out.sites, sites_of(options.sites, known.sites));
+  out.requests_per_minute = options.requests_per_minute;
+  if (options.organization.empty()) return out;
+  const auto id = parse_uuid(options.organization);
+  if (!id || !known.organizations.organization(OrganizationId{id.value()}))
+    return make_error(Errc::invalid_argument, "--organization " + options.organization +
+                                                  ": there is no such organization; the ids are in GET "
+                                                  "/api/v1/organizations");
+  out.organization = OrganizationId{id.value()};
+  return out;
+}
+
 int create(const Options& options) {
   const auto expires = expiry(options.expires, SystemClock().now());
   if (!expires) return fail(expires.error().message, 2);
@@ -109,15 +126,18 @@ int create(const Options& options) {
     std::string sites;
     for (const auto& site : options.sites) sites += (sites.empty() ? "" : ",") + json_text(site);
     if (!sites.empty()) body += R"(,"sites":[)" + sites + "]";
+    if (!options.organization.empty()) body += R"(,"organization":)" + json_text(options.organization);
+    if (options.requests_per_minute)
+      body += R"(,"requests_per_minute":)" + std::to_string(*options.requests_per_minute);
     if (expires.value()) body += R"(,"expires_at":")" + to_rfc3339(*expires.value()) + "\"";
     return through_server(options, *url, "POST", "/api/v1/tokens", body + "}");
   }
   return with_folder(options, [&](api::AccessService& access, Database& database) {
     const api::Principal who{"command line", "command line", {}};
-    const auto sites = sites_of(options.sites, database.stores().sites);
-    if (!sites) return fail(sites.error().message, 2);
+    const auto bounds = bounds_of(options, database.stores());
+    if (!bounds) return fail(bounds.error().message, 2);
     const auto made =
-        access.create_token(options.name, options.roles, expires.value(), who, "local", sites.value());
+        access.create_token(options.name, options.roles, expires.value(), who, "local", bounds.value());
     if (!made) return fail(made.error().message, 2);
     std::fprintf(stderr, "token %s, shown once:\n", to_string(made.value().token.id).c_str());
     std::printf("%s\n", made.value().text.c_str());
@@ -135,10 +155,14 @@ int list(const Options& options) {
                                 : token.expires ? "expires " + to_rfc3339(*token.expires)
                                                 : "no expiry";
       std::string sites = "every site";
-      if (!token.sites.all()) {
+      if (token.organization) {
+        sites = "organization " + to_string(*token.organization);
+      } else if (const SiteList list = token.sites.sites()) {
         sites = "sites";
-        for (const auto& id : token.sites.sites()) sites += ' ' + to_string(id);
+        for (const auto& id : *list) sites += ' ' + to_string(id);
       }
+      if (token.requests_per_minute)
+        sites += "  " + std::to_string(*token.requests_per_minute) + " requests a minute";
       std::printf("%s  %-20s  %s  %s  %s\n", to_string(token.id).c_str(), token.name.c_str(), roles.c_str(),
                   state.c_str(), sites.c_str());
     }
@@ -179,6 +203,10 @@ void add_token_command(CLI::App& app, int& exit_code) {
       ->required();
   make->add_option("--site", options->sites,
                    "id of a site that the token is bound to; may be repeated [every site]");
+  make->add_option("--organization", options->organization,
+                   "id of an organization whose sites, also those of later, it is bound to instead");
+  make->add_option("--requests-per-minute", options->requests_per_minute,
+                   "at most; measurements and commands are not counted [no limit of its own]");
   make->add_option("--expires", options->expires, "like 365d, 12h or 2027-01-31T00:00:00Z [never]");
   make->callback([&exit_code, options] { exit_code = create(*options); });
   auto* show = command->add_subcommand("list", "List tokens (without their secrets)");

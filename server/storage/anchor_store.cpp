@@ -98,7 +98,7 @@ class SqlAnchorStore final : public AnchorStore {
     return write_void(gate_, [&](Connection& c) -> std::optional<Error> {
       if (auto error = missing_site(c, anchor.site)) return error;
       if (const auto before = find_anchor(c, k_by_id, anchor.id); before && before->site != anchor.site)
-        if (auto error = beyond_quota(c, anchor.site, {0, 0, 1})) return error;
+        if (auto error = beyond_quota(c, anchor.site, {0, 0, 1}, before->site)) return error;
       Query query(c, k_anchor_update);
       bind(query, anchor, expected_version + 1);
       query << expected_version;

@@ -141,8 +141,9 @@ class SqlMissionStore final : public MissionStore {
       if (auto error = check_site(c, mission)) return error;
       const auto stored = mission_key(c, mission.id);
       if (!stored) return no_mission(mission.id);
-      if (site_of(c, *stored) != mission.site)
-        if (auto error = beyond_quota(c, mission.site, {1, count_measurements(c, *stored), 0})) return error;
+      if (const auto from = site_of(c, *stored); from != mission.site)
+        if (auto error = beyond_quota(c, mission.site, {1, count_measurements(c, *stored), 0}, from))
+          return error;
       Query query(c, k_update);
       bind(query, mission);
       const auto key = query.returned();

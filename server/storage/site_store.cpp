@@ -9,18 +9,19 @@ namespace {
 constexpr const char* k_site_insert =
     "INSERT INTO site (id, name, origin_lat_deg, origin_lon_deg, origin_height_m, outline_geojson, "
     "crs_frame, "
-    "crs_epoch_year, base_sigma_m, base_source, projected_epsg, created_t_ns, version) "
-    "VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13) ON CONFLICT DO NOTHING RETURNING "
+    "crs_epoch_year, base_sigma_m, base_source, projected_epsg, created_t_ns, organization_id, version) "
+    "VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14) ON CONFLICT DO NOTHING RETURNING "
     "version";
 constexpr const char* k_site_update =
     "UPDATE site SET name = ?2, origin_lat_deg = ?3, origin_lon_deg = ?4, origin_height_m = ?5, "
     "outline_geojson = ?6, "
     "crs_frame = ?7, crs_epoch_year = ?8, base_sigma_m = ?9, base_source = ?10, projected_epsg = ?11, "
-    "created_t_ns = ?12, version = ?13 WHERE id = ?1 AND version = ?14 RETURNING version";
+    "created_t_ns = ?12, organization_id = ?13, version = ?14 WHERE id = ?1 AND version = ?15 RETURNING "
+    "version";
 constexpr const char* k_site_columns =
     "SELECT id, name, origin_lat_deg, origin_lon_deg, origin_height_m, outline_geojson, crs_frame, "
     "crs_epoch_year, "
-    "base_sigma_m, base_source, projected_epsg, created_t_ns, version FROM site ";
+    "base_sigma_m, base_source, projected_epsg, created_t_ns, organization_id, version FROM site ";
 constexpr const char* k_site_users =
     "SELECT (SELECT count(*) FROM mission WHERE site_id = ?1) + (SELECT count(*) FROM anchor WHERE site_id = "
     "?1) + (SELECT count(*) FROM local_frame WHERE site_id = ?1) + (SELECT count(*) FROM building WHERE "
@@ -35,7 +36,7 @@ void bind(Query& query, const Site& s, std::uint64_t version) {
     query << *s.projected_epsg;
   else
     query << std::nullopt;
-  query << s.created << version;
+  query << s.created << s.organization << version;
 }
 
 Site read_site(Query& query) {
@@ -50,6 +51,7 @@ Site read_site(Query& query) {
   s.base_source = query.text();
   s.projected_epsg = query.maybe([&] { return query.as<int>(); });
   s.created = query.time();
+  s.organization = query.maybe([&] { return query.id<OrganizationId>(); });
   s.version = query.as<std::uint64_t>();
   return s;
 }
@@ -61,12 +63,19 @@ std::optional<Site> find_site(Connection& c, const SiteId& id) {
   return read_site(query);
 }
 
+/// Why it may not become one of its organization.
+std::optional<Error> comes_into(Connection& c, const Site& site) {
+  if (auto missing = missing_organization(c, site.organization)) return missing;
+  return beyond_quota(c, site.organization, site.id);
+}
+
 class SqlSiteStore final : public SiteStore {
  public:
   explicit SqlSiteStore(Gate& gate) : gate_(gate) {}
 
   Result<void> insert(const Site& site) override {
     return write_void(gate_, [&](Connection& c) -> std::optional<Error> {
+      if (auto error = comes_into(c, site)) return error;
       Query query(c, k_site_insert);
       bind(query, site, site.version);
       if (query.returned()) return std::nullopt;
@@ -75,6 +84,9 @@ class SqlSiteStore final : public SiteStore {
   }
   Result<void> update(const Site& site, std::uint64_t expected_version) override {
     return write_void(gate_, [&](Connection& c) -> std::optional<Error> {
+      const auto before = find_site(c, site.id);
+      if (before && before->organization != site.organization)
+        if (auto error = comes_into(c, site)) return error;
       Query query(c, k_site_update);
       bind(query, site, expected_version + 1);
       query << expected_version;
@@ -90,11 +102,14 @@ class SqlSiteStore final : public SiteStore {
       return *std::move(found);
     });
   }
-  Result<std::vector<Site>> sites(std::size_t limit, const std::optional<SiteId>& after) override {
+  Result<std::vector<Site>> sites(std::size_t limit, const std::optional<SiteId>& after,
+                                  const std::optional<OrganizationId>& organization) override {
     return read_value<std::vector<Site>>(gate_, [&](Connection& c) -> Result<std::vector<Site>> {
-      Query query(c, std::string(k_site_columns) + "WHERE id > ?1 ORDER BY id LIMIT ?2");
+      const char* const of = organization ? "AND organization_id = ?3 " : "";
+      Query query(c, std::string(k_site_columns) + "WHERE id > ?1 " + of + "ORDER BY id LIMIT ?2");
       const SiteId start = after.value_or(SiteId{});
       query << start << row_limit(limit);
+      if (organization) query << *organization;
       std::vector<Site> found;
       while (query.step()) found.push_back(read_site(query));
       return found;

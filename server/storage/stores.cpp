@@ -30,10 +30,11 @@ SqlStores::SqlStores(Gate& gate, AdmitMission admit, const CirFolder& files)
       webhooks(make_webhook_store(gate)),
       places(make_place_store(gate)),
       bundles(make_bundle_store(gate, files)),
+      organizations(make_organization_store(gate)),
       cir_archive(make_cir_archive(gate, files, *measurements)),
-      ports{*measurements, *missions,     *bin,           *exclusions, *events, *procedure_log, *sites,
-            *anchors,      *calibrations, *revisions,     *kits,       *frames, *plans,         *campaigns,
-            *labels,       *datasets,     *training_runs, *models,     *jobs,   *tokens,        *access,
-            *service,      *webhooks,     *places,        *bundles} {}
+      ports{*measurements,  *missions,     *bin,  *exclusions, *events, *procedure_log, *sites,    *anchors,
+            *calibrations,  *revisions,    *kits, *frames,     *plans,  *campaigns,     *labels,   *datasets,
+            *training_runs, *models,       *jobs, *tokens,     *access, *service,       *webhooks, *places,
+            *bundles,       *organizations} {}
 
 }  // namespace anchord::sql

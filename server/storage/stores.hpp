@@ -17,6 +17,7 @@
 #include "core/ports/measurement_store.hpp"
 #include "core/ports/mission_bin.hpp"
 #include "core/ports/mission_store.hpp"
+#include "core/ports/organization_store.hpp"
 #include "core/ports/place_store.hpp"
 #include "core/ports/plan_store.hpp"
 #include "core/ports/procedure_log.hpp"
@@ -58,6 +59,7 @@ std::unique_ptr<EventStore> make_event_store(Gate& gate);
 std::unique_ptr<ProcedureLog> make_procedure_log(Gate& gate);
 std::unique_ptr<WebhookStore> make_webhook_store(Gate& gate);
 std::unique_ptr<PlaceStore> make_place_store(Gate& gate);
+std::unique_ptr<OrganizationStore> make_organization_store(Gate& gate);
 std::unique_ptr<BundleStore> make_bundle_store(Gate& gate, const CirFolder& files = {});
 /// measurements: over the same gate and folder.
 std::unique_ptr<CirArchive> make_cir_archive(Gate& gate, const CirFolder& files,
@@ -92,6 +94,7 @@ struct SqlStores {
   const std::unique_ptr<WebhookStore> webhooks;
   const std::unique_ptr<PlaceStore> places;
   const std::unique_ptr<BundleStore> bundles;
+  const std::unique_ptr<OrganizationStore> organizations;
   const std::unique_ptr<CirArchive> cir_archive;
   const Stores ports;
 };
@@ -103,6 +106,8 @@ std::vector<BinnedMission> read_binned_missions(Connection& connection);
 
 /// not_found when a site is named that is not there.
 std::optional<Error> missing_site(Connection& connection, const std::optional<SiteId>& site);
+std::optional<Error> missing_organization(Connection& connection,
+                                          const std::optional<OrganizationId>& organization);
 
 /// SQL's LIMIT of a page size that comes from outside.
 std::int64_t row_limit(std::size_t limit);

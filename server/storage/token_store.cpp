@@ -5,13 +5,13 @@ namespace {
 
 constexpr const char* k_insert =
     "INSERT INTO token (id, name, secret_sha256_hex, created_t_ns, expires_t_ns, revoked_t_ns, "
-    "last_used_t_ns, bound) "
-    "VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8)";
+    "last_used_t_ns, bound, organization_id, requests_per_minute) "
+    "VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10)";
 constexpr const char* k_insert_role = "INSERT INTO token_role (token_id, ordinal, role) VALUES (?1, ?2, ?3)";
 constexpr const char* k_insert_site = "INSERT INTO token_site (token_id, site_id) VALUES (?1, ?2)";
 constexpr const char* k_columns =
-    "SELECT id, name, secret_sha256_hex, created_t_ns, expires_t_ns, revoked_t_ns, last_used_t_ns, bound "
-    "FROM token ";
+    "SELECT id, name, secret_sha256_hex, created_t_ns, expires_t_ns, revoked_t_ns, last_used_t_ns, bound, "
+    "organization_id, requests_per_minute FROM token ";
 constexpr const char* k_roles = "SELECT role FROM token_role WHERE token_id = ?1 ORDER BY ordinal";
 constexpr const char* k_sites = "SELECT site_id FROM token_site WHERE token_id = ?1";
 // A second revocation keeps the time of the first.
@@ -29,6 +29,8 @@ Token read(Connection& c, Query& query) {
   token.revoked = query.maybe_time();
   token.last_used = query.maybe_time();
   const bool bound = query.integer() != 0;
+  token.organization = query.maybe([&] { return query.id<OrganizationId>(); });
+  token.requests_per_minute = query.maybe([&] { return query.as<std::uint32_t>(); });
   Query roles(c, k_roles);
   roles << token.id;
   while (roles.step()) token.roles.push_back(roles.text());
@@ -47,9 +49,11 @@ class SqlTokenStore final : public TokenStore {
 
   Result<void> insert(const Token& token) override {
     return write_void(gate_, [&](Connection& c) -> std::optional<Error> {
+      if (auto missing = missing_organization(c, token.organization)) return missing;
       Query query(c, k_insert);
       query << token.id << token.name << token.secret_sha256_hex << token.created << token.expires
-            << token.revoked << token.last_used << !token.sites.all();
+            << token.revoked << token.last_used << (token.organization || !token.sites.all())
+            << token.organization << std::optional<std::uint64_t>(token.requests_per_minute);
       query.run();
       std::int64_t ordinal = 0;
       for (const std::string& role : token.roles) {
@@ -57,8 +61,8 @@ class SqlTokenStore final : public TokenStore {
         insert_role << token.id << ordinal++ << role;
         insert_role.run();
       }
-      if (token.sites.all()) return std::nullopt;
-      for (const SiteId& site : token.sites.sites()) {
+      if (token.organization || token.sites.all()) return std::nullopt;
+      for (const SiteId& site : *token.sites.sites()) {
         Query insert_site(c, k_insert_site);
         insert_site << token.id << site;
         insert_site.run();

@@ -44,8 +44,7 @@ class AppFixture : public ::testing::Test {
     auto opened = open_database(options);
     ASSERT_TRUE(opened.has_value()) << opened.error().message;
     database_ = std::move(opened).value();
-    access_ =
-        std::make_unique<api::AccessService>(database_->stores().tokens, database_->stores().access, clock_);
+    access_ = std::make_unique<api::AccessService>(database_->stores(), clock_);
     ASSERT_TRUE(access_->load());
     api::Application::Deps deps{.stores = database_->stores(),
                                 .work = {*live_, *joint_, at_once_, jobs_},

@@ -319,7 +319,7 @@ TEST_F(ClockSteps, EndNoLeaseAndProlongNone) {
 TEST_F(ClockSteps, LockNobodyOutAndBringNobodyBack) {
   api::AccessOptions options;
   options.steady = &steady_;
-  api::AccessService access(database_->stores().tokens, database_->stores().access, clock_, options);
+  api::AccessService access(database_->stores(), clock_, options);
   const api::Principal admin{"a", "a", {Role::admin}};
   const auto made =
       access.create_token("t", {"operator"}, UtcTime{clock_.now().ns + 3'600'000'000'000}, admin, "here");
@@ -343,7 +343,7 @@ TEST_F(ClockSteps, LockNobodyOutAndBringNobodyBack) {
   EXPECT_FALSE(access.verify(made.value().text)) << "its hour has passed, whatever the clock says";
   EXPECT_FALSE(access.session(cookie.value())) << "and the login with it";
   clock_.ahead_s = 0;
-  api::AccessService next_start(database_->stores().tokens, database_->stores().access, clock_, options);
+  api::AccessService next_start(database_->stores(), clock_, options);
   ASSERT_TRUE(next_start.load());
   EXPECT_TRUE(next_start.verify(made.value().text)) << "a start judges by the clock it finds";
 }

@@ -10,10 +10,19 @@
 
 namespace anchord::test {
 
+/// How a firm's token is bound.
+enum class Bound : std::uint8_t {
+  to_sites,         ///< to its site, which was there before
+  to_organization,  ///< to its organization; the site is of later, made with the token
+};
+inline std::string bound_name(const testing::TestParamInfo<Bound>& info) {
+  return info.param == Bound::to_sites ? "ToSites" : "ToOrganization";
+}
+
 /// Two firms on one server: each has a site, a token bound to it with every role, and of everything that can
 /// be made of a site one, made with that token. What is of the first carries "alfa" in its names ("alpha"
 /// stands in every style of a map), what is of the second "bravo".
-class SiteTokens : public AppFixture {
+class SiteTokens : public AppFixture, public testing::WithParamInterface<Bound> {
  protected:
   using Method = api::Method;
 
@@ -96,17 +105,22 @@ class SiteTokens : public AppFixture {
   Firm firm(const std::string& word, std::uint32_t anchor) {
     Firm out;
     out.word = word;
-    const auto site = post(
-        "/api/v1/sites",
-        Json{{"name", word + " works"}, {"origin", {{"lon", 3.713}, {"lat", 51.023}, {"h_m", 55}}}}.dump());
-    EXPECT_EQ(site.status, 201) << site.body;
     auto& ids = out.ids;
-    ids["site"] = json(site)["id"];
-    const auto token =
-        post("/api/v1/tokens",
-             Json{{"name", word + " crew"}, {"roles", {"admin"}}, {"sites", {ids["site"]}}}.dump());
-    EXPECT_EQ(token.status, 201) << token.body;
-    out.who = access_->verify(json(token)["token"].get<std::string>()).value();
+    const auto organization = post("/api/v1/organizations", Json{{"name", word + " group"}}.dump());
+    EXPECT_EQ(organization.status, 201) << organization.body;
+    ids["organization"] = json(organization)["id"];
+    const Json works{{"name", word + " works"}, {"origin", {{"lon", 3.713}, {"lat", 51.023}, {"h_m", 55}}}};
+    Json token{{"name", word + " crew"}, {"roles", {"admin"}}};
+    if (GetParam() == Bound::to_organization) {
+      token["organization"] = ids["organization"];
+    } else {
+      ids["site"] = made({"", api::local_principal(), {}, {}}, "/api/v1/sites", works);
+      token["sites"] = {ids["site"]};
+    }
+    const auto bound = post("/api/v1/tokens", token.dump());
+    EXPECT_EQ(bound.status, 201) << bound.body;
+    out.who = access_->verify(json(bound)["token"].get<std::string>()).value();
+    if (GetParam() == Bound::to_organization) ids["site"] = made(out, "/api/v1/sites", works);
     const Json mission{{"name", word + " flight"},
                        {"site", ids["site"]},
                        {"frame", "wgs84"},

@@ -31,7 +31,7 @@ class SiteTokenStream : public SiteTokens {
   }
 };
 
-TEST_F(SiteTokenStream, ShowsOnEveryTopicWhatIsOfItsSitesAlone) {
+TEST_P(SiteTokenStream, ShowsOnEveryTopicWhatIsOfItsSitesAlone) {
   for (auto* firm : {&alpha_, &bravo_})  // what the fixture did is in the snapshots
     fly(*firm, firm->id("mission"), 5);
   auto alpha = listen(alpha_.who), bravo = listen(bravo_.who), all = listen(api::local_principal());
@@ -57,7 +57,7 @@ TEST_F(SiteTokenStream, ShowsOnEveryTopicWhatIsOfItsSitesAlone) {
 }
 
 // Who flies must have the alarms: those of its own missions and of the whole server, and no other's.
-TEST_F(SiteTokenStream, ShowsAlarmsOfTheServerAndOfItsMissions) {
+TEST_P(SiteTokenStream, ShowsAlarmsOfTheServerAndOfItsMissions) {
   const auto alarm = [](const char* id, std::optional<MissionId> mission, bool of_sites) {
     return api::Alarm{{id, api::AlarmPriority::warning, "text", mission, of_sites}, {}, false};
   };
@@ -105,7 +105,7 @@ TEST_F(SiteTokenStream, ShowsAlarmsOfTheServerAndOfItsMissions) {
   for (auto* one : {&client, &all}) (*one)->on_close();
 }
 
-TEST_F(SiteTokenStream, AResumedStreamLeavesOutWhatWasOfAnotherSite) {
+TEST_P(SiteTokenStream, AResumedStreamLeavesOutWhatWasOfAnotherSite) {
   fly(alpha_, alpha_.id("mission"), 5);
   auto bravo = app_->ws_factory()(bravo_.who, [] { return true; });
   bravo->on_open([] {});
@@ -118,6 +118,9 @@ TEST_F(SiteTokenStream, AResumedStreamLeavesOutWhatWasOfAnotherSite) {
   EXPECT_NE(betrayed(bravo_, got), "") << got;
   bravo->on_close();
 }
+
+INSTANTIATE_TEST_SUITE_P(Bound, SiteTokenStream, testing::Values(Bound::to_sites, Bound::to_organization),
+                         bound_name);
 
 }  // namespace
 }  // namespace anchord::test

@@ -18,6 +18,7 @@ std::string with_params(const std::string& pattern, const std::map<std::string, 
       {"/api/v1/plans/", "plan"},
       {"/api/v1/frames/", "frame"},
       {"/api/v1/sites/", "site"},
+      {"/api/v1/organizations/", "organization"},
       {"/api/v1/anchors/", "anchor"},
       {"/api/v1/calibrations/", "calibration"},
       {"/api/v1/jobs/", "job"},
@@ -78,7 +79,7 @@ class SiteTokenRoutes : public SiteTokens {
   }
 };
 
-TEST_F(SiteTokenRoutes, EveryRouteHasARowAndEveryRowARoute) {
+TEST_P(SiteTokenRoutes, EveryRouteHasARowAndEveryRowARoute) {
   std::set<std::string> served, ruled;
   for (const auto& route : app_->router().routes())
     served.insert(std::string(to_string(route.method)) + ' ' + route.pattern);
@@ -91,13 +92,15 @@ TEST_F(SiteTokenRoutes, EveryRouteHasARowAndEveryRowARoute) {
   EXPECT_EQ(api::site_rule(Method::get, "/api/v1/of-tomorrow"), SiteRule::refused);
 }
 
-TEST_F(SiteTokenRoutes, WhatIsOfAnotherSiteIsAnsweredAsWhatNeverWas) {
+TEST_P(SiteTokenRoutes, WhatIsOfAnotherSiteIsAnsweredAsWhatNeverWas) {
   for (const auto& route : api::route_sites()) {
     const std::string pattern(route.pattern), what = std::string(to_string(route.method)) + ' ' + pattern;
     if (pattern.find('{') == std::string::npos || pattern.starts_with("/ogc") || pattern.starts_with("/prob"))
       continue;
     std::string theirs = pattern, unknown = pattern;
-    if (route.rule == SiteRule::refused) {
+    const bool refused =
+        route.rule == SiteRule::refused || (route.rule == SiteRule::own && GetParam() == Bound::to_sites);
+    if (refused) {
       theirs = unknown = std::regex_replace(pattern, std::regex("\\{[a-z]+\\}"), alpha_.id("site"));
     } else {
       theirs = with_params(pattern, named(alpha_));
@@ -106,7 +109,7 @@ TEST_F(SiteTokenRoutes, WhatIsOfAnotherSiteIsAnsweredAsWhatNeverWas) {
     const SiteTokens::Ask ask{body_for(route)};
     const auto answer = as(bravo_.who, route.method, theirs, ask);
     const auto never = as(bravo_.who, route.method, unknown, ask);
-    if (route.rule == SiteRule::refused) {
+    if (refused) {
       EXPECT_EQ(answer.status, 403) << what << ' ' << text(answer);
     } else if (answer.status != 415 && answer.status != 422) {  // it did not come to what it names
       EXPECT_EQ(answer.status, 404) << what << ' ' << text(answer);
@@ -121,7 +124,7 @@ TEST_F(SiteTokenRoutes, WhatIsOfAnotherSiteIsAnsweredAsWhatNeverWas) {
 }
 
 // Else the test above would pass of a server that answers 404 to everything.
-TEST_F(SiteTokenRoutes, WhatIsOfItsOwnSiteIsThere) {
+TEST_P(SiteTokenRoutes, WhatIsOfItsOwnSiteIsThere) {
   const std::set<std::string> none_yet{"/api/v1/missions/{id}/procedure",
                                        "/api/v1/missions/{id}/grid",
                                        "/api/v1/missions/{id}/plan",
@@ -143,6 +146,10 @@ TEST_F(SiteTokenRoutes, WhatIsOfItsOwnSiteIsThere) {
       continue;
     const auto answer = as(alpha_.who, Method::get, with_params(pattern, named(alpha_)));
     if (none_yet.contains(pattern)) continue;
+    if (pattern.starts_with("/api/v1/organizations") && GetParam() == Bound::to_sites) {
+      EXPECT_EQ(answer.status, 404) << pattern << ": of who is bound to it";
+      continue;
+    }
     EXPECT_NE(answer.status, 404) << pattern << ' ' << text(answer);
     EXPECT_NE(answer.status, 403) << pattern << ' ' << text(answer);
     ++seen;
@@ -150,9 +157,10 @@ TEST_F(SiteTokenRoutes, WhatIsOfItsOwnSiteIsThere) {
   EXPECT_GE(seen, 20u);
 }
 
-TEST_F(SiteTokenRoutes, ListsExportsAndDocumentsHoldNothingOfAnotherSite) {
+TEST_P(SiteTokenRoutes, ListsExportsAndDocumentsHoldNothingOfAnotherSite) {
   const std::map<std::string, std::string> of_theirs{{"mission", alpha_.id("mission")},
                                                      {"site", alpha_.id("site")},
+                                                     {"organization", alpha_.id("organization")},
                                                      {"building", alpha_.id("building")},
                                                      {"revision", alpha_.id("number")},
                                                      {"view", "live"},
@@ -205,7 +213,7 @@ TEST_F(SiteTokenRoutes, ListsExportsAndDocumentsHoldNothingOfAnotherSite) {
   EXPECT_EQ(json(get_as(bravo_, "/ogc/collections/anchors/items"))["numberMatched"], 2);
 }
 
-TEST_F(SiteTokenRoutes, PagesAreFullAndEndWithTheLastOfItsOwn) {
+TEST_P(SiteTokenRoutes, PagesAreFullAndEndWithTheLastOfItsOwn) {
   for (int i = 0; i < 3; ++i) {
     for (const auto* firm : {&alpha_, &bravo_})
       ASSERT_EQ(post_as(*firm, "/api/v1/missions",
@@ -224,7 +232,7 @@ TEST_F(SiteTokenRoutes, PagesAreFullAndEndWithTheLastOfItsOwn) {
   EXPECT_TRUE(rest["next_cursor"].is_null());
 }
 
-TEST_F(SiteTokenRoutes, WhatHasNoSiteIsForTokensOfEverySite) {
+TEST_P(SiteTokenRoutes, WhatHasNoSiteIsForTokensOfEverySite) {
   const auto siteless = mission();
   EXPECT_EQ(get("/api/v1/missions/" + siteless).status, 200);
   EXPECT_EQ(get_as(alpha_, "/api/v1/missions/" + siteless).status, 404);
@@ -232,7 +240,7 @@ TEST_F(SiteTokenRoutes, WhatHasNoSiteIsForTokensOfEverySite) {
   EXPECT_EQ(json(get_as(alpha_, "/api/v1/missions"))["items"].size(), 1u);
 }
 
-TEST_F(SiteTokenRoutes, SystemSaysOfTheWholeServerWhatItsLiveTopicSays) {
+TEST_P(SiteTokenRoutes, SystemSaysOfTheWholeServerWhatItsLiveTopicSays) {
   const Json all = json(get("/api/v1/system")), bound = json(get_as(alpha_, "/api/v1/system"));
   for (const char* of_the_server : {"clock", "drone", "mqtt", "cir_archive"}) {
     EXPECT_TRUE(all.contains(of_the_server));
@@ -242,7 +250,7 @@ TEST_F(SiteTokenRoutes, SystemSaysOfTheWholeServerWhatItsLiveTopicSays) {
     EXPECT_TRUE(bound.contains(shared)) << bound;
 }
 
-TEST_F(SiteTokenRoutes, NothingIsWrittenOfOrIntoAnotherSite) {
+TEST_P(SiteTokenRoutes, NothingIsWrittenOfOrIntoAnotherSite) {
   const auto refused = [&](const std::string& path, const Json& body) {
     const auto answer = post_as(bravo_, path, body);
     EXPECT_GE(answer.status, 404) << path << ' ' << answer.body;
@@ -259,6 +267,15 @@ TEST_F(SiteTokenRoutes, NothingIsWrittenOfOrIntoAnotherSite) {
   EXPECT_EQ(as_match(bravo_, Method::patch, "/api/v1/plans/" + bravo_.id("plan"), to_alpha).status, 422);
   for (const auto& where : {to_alpha, std::string(R"({"site":null})")})
     EXPECT_EQ(as_match(bravo_, Method::patch, "/api/v1/anchors/" + bravo_.network_ids[0], where).status, 422);
+  const auto to_alphas = Json{{"organization", alpha_.id("organization")}}.dump();
+  for (const auto& where : {to_alphas, Json{{"organization", bravo_.id("organization")}}.dump()}) {
+    const bool stays = where != to_alphas && GetParam() == Bound::to_organization;
+    EXPECT_EQ(as_match(bravo_, Method::patch, "/api/v1/sites/" + bravo_.id("site"), where).status,
+              stays ? 200 : 403);
+  }
+  EXPECT_EQ(
+      post_as(bravo_, "/api/v1/sites", {{"name", "x"}, {"organization", alpha_.id("organization")}}).status,
+      GetParam() == Bound::to_organization ? 422 : 403);
   refused("/api/v1/buildings", {{"name", "x"}, {"site", site}});
   refused("/api/v1/floors", {{"name", "x"}, {"level", 1}, {"building", alpha_.id("building")}});
   refused("/api/v1/calibrations", {{"missions", {alpha_.id("mission")}}});
@@ -287,7 +304,7 @@ TEST_F(SiteTokenRoutes, NothingIsWrittenOfOrIntoAnotherSite) {
             404);
 }
 
-TEST_F(SiteTokenRoutes, WhatIsMadeWithoutASiteIsOfTheOneThatTheTokenIsBoundTo) {
+TEST_P(SiteTokenRoutes, WhatIsMadeWithoutASiteIsOfTheOneThatTheTokenIsBoundTo) {
   Json plan = json(get_as(bravo_, "/api/v1/plans/" + bravo_.id("plan")));
   for (const char* key : {"id", "revision", "created_at", "changed_at", "site"}) plan.erase(key);
   Firm both = bravo_;
@@ -304,7 +321,7 @@ TEST_F(SiteTokenRoutes, WhatIsMadeWithoutASiteIsOfTheOneThatTheTokenIsBoundTo) {
   }
 }
 
-TEST_F(SiteTokenRoutes, AnAnchorOfAnotherSiteIsNotPublishedUnderItsNetworkId) {
+TEST_P(SiteTokenRoutes, AnAnchorOfAnotherSiteIsNotPublishedUnderItsNetworkId) {
   int n = 0;
   const auto calibration = stored_calibration([&](Estimate& e) { e.anchor = {n++ == 0 ? 0xa1a1u : 0xb2b9u}; },
                                               bravo_.id("mission"));
@@ -319,7 +336,7 @@ TEST_F(SiteTokenRoutes, AnAnchorOfAnotherSiteIsNotPublishedUnderItsNetworkId) {
   EXPECT_EQ(json(get_as(alpha_, "/api/v1/revisions"))["items"].size(), 1u);
 }
 
-TEST_F(SiteTokenRoutes, TheAuditLogNamesTheTokenThatChangedSomething) {
+TEST_P(SiteTokenRoutes, TheAuditLogNamesTheTokenThatChangedSomething) {
   const auto entries = database_->stores().access.audit(1000).value();
   const auto by = [&](const std::string& who, const std::string& what) {
     return std::ranges::any_of(entries, [&](const auto& e) { return e.who == who && e.what == what; });
@@ -329,9 +346,12 @@ TEST_F(SiteTokenRoutes, TheAuditLogNamesTheTokenThatChangedSomething) {
   EXPECT_FALSE(by(bravo_.who.token_id, "mission.create " + alpha_.id("mission")));
 }
 
-TEST_F(SiteTokenRoutes, SaysOfWhichSitesATokenIs) {
+TEST_P(SiteTokenRoutes, SaysOfWhichSitesATokenIs) {
   EXPECT_EQ(json(get_as(alpha_, "/api/v1/me"))["sites"], Json::array({alpha_.id("site")}));
+  EXPECT_EQ(json(get_as(alpha_, "/api/v1/me"))["organization"],
+            GetParam() == Bound::to_organization ? Json(alpha_.id("organization")) : Json());
   EXPECT_TRUE(json(get("/api/v1/me"))["sites"].is_null());
+  EXPECT_TRUE(json(get("/api/v1/me"))["organization"].is_null());
   const auto tokens = json(get("/api/v1/tokens"))["items"];
   EXPECT_EQ(std::ranges::count_if(tokens, [](const Json& t) { return t["sites"].is_array(); }), 2);
   for (const Json& sites :
@@ -346,7 +366,7 @@ TEST_F(SiteTokenRoutes, SaysOfWhichSitesATokenIs) {
   for (std::size_t i = 0; i < kept.size(); ++i) EXPECT_EQ(kept[i]["sites"], tokens[i]["sites"]);
 }
 
-TEST_F(SiteTokenRoutes, ATokenWhoseSiteIsGoneSeesNothing) {
+TEST_P(SiteTokenRoutes, ATokenWhoseSiteIsGoneSeesNothing) {
   const auto empty = post("/api/v1/sites", R"({"name":"short-lived"})");
   const std::string site = json(empty)["id"];
   const auto token =
@@ -360,6 +380,9 @@ TEST_F(SiteTokenRoutes, ATokenWhoseSiteIsGoneSeesNothing) {
   EXPECT_TRUE(json(as(who, Method::get, "/api/v1/sites"))["items"].empty());
   EXPECT_TRUE(json(as(who, Method::get, "/api/v1/missions"))["items"].empty());
 }
+
+INSTANTIATE_TEST_SUITE_P(Bound, SiteTokenRoutes, testing::Values(Bound::to_sites, Bound::to_organization),
+                         bound_name);
 
 }  // namespace
 }  // namespace anchord::test

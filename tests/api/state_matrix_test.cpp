@@ -136,6 +136,11 @@ TEST_F(StateMatrix, OfPlansDevicesAndSitesHoldsToo) {
   try_all(409, 409, device, true);
   try_all(409, 409, plan, true);
   try_all(409, 409, site, false);
+  const std::string firm = json(post("/api/v1/organizations", R"({"name":"used"})"))["id"];
+  ASSERT_EQ(
+      post("/api/v1/tokens", R"({"name":"t","roles":["viewer"],"organization":")" + firm + "\"}").status,
+      201);
+  try_all(409, 409, "/api/v1/organizations/" + firm, false);
   finish(id, key);
   EXPECT_EQ(ask(Method::del, device, "", {Role::op}, {{"if-match", "*"}}).status, 204);
 }
@@ -148,6 +153,7 @@ TEST_F(StateMatrix, EveryRouteThatDeletesIsKnown) {
       "/api/v1/devices/{id}",          // enabled while a mission records: 409
       "/api/v1/plans/{id}",            // being flown: 409
       "/api/v1/sites/{id}",            // with missions, anchors or frames: 409
+      "/api/v1/organizations/{id}",    // with sites, or tokens that were not revoked: 409
       "/api/v1/frames/{id}",           // If-Match; positions are stored on the globe
       "/api/v1/calibrations/{id}",     // published: 409
       "/api/v1/campaigns/{id}",        // of a training that waits or runs: 409

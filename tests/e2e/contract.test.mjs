@@ -9,7 +9,7 @@ import { createInterface } from 'node:readline';
 import { after, before, test } from 'node:test';
 import { in_parts } from './bundle_bodies.mjs';
 import { Contract, checked } from './contract.mjs';
-import { caster, quota, rover } from './device_bodies.mjs';
+import { caster, firm, quota, rover, spareFirm } from './device_bodies.mjs';
 import { ndjson, simulatedFlight } from './flight.mjs';
 import { omlox, unknown } from './omlox.mjs';
 import { room_png } from './room.mjs';
@@ -106,6 +106,7 @@ test('a local frame, fitted to the published anchors', async () => {
   const mapped = { projected_epsg: 25831, crs: { frame: 'ETRS89' } };
   await call('PATCH', `/api/v1/sites/${ids.site}`, merge(site.headers.get('etag'), mapped));
   for (const method of ['GET', 'PUT']) await call(method, `/api/v1/sites/${ids.site}/quota`, quota[method]);
+  ids.organization = await firm(call, ids.site, merge);
   for (const { properties } of (await call('GET', '/api/v1/anchors', { expect: 200 })).json.features) {
     const path = `/api/v1/anchors/${properties.network_id}`;
     const { headers } = await call('GET', path, { expect: 200 });
@@ -451,6 +452,7 @@ test('everything that can be read', async () => {
   ids.anchor = '0x6a21';
   const given = {
     '/sites/': ids.site,
+    '/organizations/': ids.organization,
     '/missions/': ids.mission,
     '/ranges/': ids.range,
     '/anchors/': ids.anchor,
@@ -572,10 +574,9 @@ test('what can be deleted', async () => {
     expect: 204,
     headers: { 'if-match': await etag(`${spare}?deleted=true`) },
   });
-  const used = `/api/v1/sites/${ids.site}`;
-  await call('DELETE', used, { expect: 409, headers: { 'if-match': await etag(used) } }); // anchors are on it
   const site = (await call('POST', '/api/v1/sites', { expect: 201, json: { name: 'spare site' } })).json.id;
-  for (const path of [`/api/v1/frames/${ids.frame}`, `/api/v1/sites/${site}`]) {
+  const empty = await spareFirm(call, ids);
+  for (const path of [`/api/v1/frames/${ids.frame}`, `/api/v1/sites/${site}`, empty]) {
     const answer = await call('DELETE', path, { headers: { 'if-match': (await etag(path)) ?? '*' } });
     assert.ok(answer.status < 300, `${path}: ${answer.status} ${answer.text}`);
   }

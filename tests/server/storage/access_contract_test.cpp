@@ -12,8 +12,17 @@ using testing::ElementsAre;
 class AccessContract : public StoreContract {};
 
 TEST_P(AccessContract, FindsATokenBySecretAndKeepsTheFirstRevocation) {
-  Token token{
-      TokenId{make_uuid_v7(k_noon)}, "gate", std::string(64, 'a'), {"gateway", "viewer"}, k_noon, {}, {}, {}};
+  Token token{TokenId{make_uuid_v7(k_noon)},
+              "gate",
+              std::string(64, 'a'),
+              {"gateway", "viewer"},
+              k_noon,
+              {},
+              {},
+              {},
+              {},
+              {},
+              {}};
   ASSERT_TRUE(db_->stores().tokens.insert(token));
   EXPECT_EQ(db_->stores().tokens.insert(token).error().code, Errc::conflict);
   ASSERT_TRUE(db_->stores().tokens.touch(token.id, UtcTime{5}));
@@ -32,7 +41,17 @@ TEST_P(AccessContract, FindsATokenBySecretAndKeepsTheFirstRevocation) {
 
 TEST_P(AccessContract, KeepsTheSitesThatATokenIsBoundTo) {
   const SiteId north{make_uuid_v7(k_noon)}, south{make_uuid_v7(k_noon)};
-  Token bound{TokenId{make_uuid_v7(k_noon)}, "north", std::string(64, 'a'), {"viewer"}, k_noon, {}, {}, {}};
+  Token bound{TokenId{make_uuid_v7(k_noon)},
+              "north",
+              std::string(64, 'a'),
+              {"viewer"},
+              k_noon,
+              {},
+              {},
+              {},
+              {},
+              {},
+              {}};
   bound.sites = SiteSet::only({south, north, north});
   Token nothing = bound;
   nothing.id = TokenId{make_uuid_v7(k_noon)};
@@ -45,7 +64,7 @@ TEST_P(AccessContract, KeepsTheSitesThatATokenIsBoundTo) {
   for (const auto& token : {bound, nothing, all}) ASSERT_TRUE(db_->stores().tokens.insert(token));
   const auto found = db_->stores().tokens.token(bound.id).value().sites;
   ASSERT_FALSE(found.all());
-  EXPECT_THAT(found.sites(), ElementsAre(north, south));
+  EXPECT_THAT(*found.sites(), ElementsAre(north, south));
   EXPECT_TRUE(found.holds(north));
   EXPECT_FALSE(found.holds(std::nullopt));
   const auto none = db_->stores().tokens.token_by_secret(std::string(64, 'b')).value().sites;
@@ -120,7 +139,17 @@ TEST_P(AccessContract, MarksWhatARequestWritesInTheSameTransaction) {
     const auto found = access.answer("gate", "k").value();
     return found ? found->status : -1;
   };
-  Token token{TokenId{make_uuid_v7(k_noon)}, "gate", std::string(64, 'a'), {"viewer"}, k_noon, {}, {}, {}};
+  Token token{TokenId{make_uuid_v7(k_noon)},
+              "gate",
+              std::string(64, 'a'),
+              {"viewer"},
+              k_noon,
+              {},
+              {},
+              {},
+              {},
+              {},
+              {}};
   ASSERT_TRUE(db_->stores().tokens.insert(token));
   {
     const RequestMark mark(begun);

@@ -279,7 +279,7 @@ TEST_P(AnchorStoreContract, ChangesASiteOnlyFromTheVersionNamed) {
   EXPECT_EQ(found.outline, site.outline);
   EXPECT_EQ(found.crs_epoch, 2026.34);
   EXPECT_EQ(found.base_sigma_m, 0.008);
-  EXPECT_EQ(db_->stores().sites.sites(10, std::nullopt).value().size(), 1u);
+  EXPECT_EQ(db_->stores().sites.sites(10, std::nullopt, std::nullopt).value().size(), 1u);
   Mission m;
   m.id = MissionId{make_uuid_v7(k_noon)};
   m.site = site.id;

@@ -66,7 +66,8 @@ TEST_F(Migrate, FindsEveryLandedMigrationAsItWas) {
             "18 a321ed30ffc793ad0a3abe4a581d763e81c93057111c1585840c155e1043395a\n"
             "19 0f74240deb1acbb9558d993f5299545713624b395c4c161950a6738675df3792\n"
             "20 1352e742a624fea1d90bef0c901052fca5fb74416b1de59078c4ec154e47d45b\n"
-            "21 84c4b4519ba854471f06258236d51fe2308c585274418d8b00ee6d5fcd97d85f\n");
+            "21 84c4b4519ba854471f06258236d51fe2308c585274418d8b00ee6d5fcd97d85f\n"
+            "22 3f353be0ec3276795a2b41bdf12553b667b26e63b4b7c4972e07032bb0211cb2\n");
 }
 
 TEST_F(Migrate, KnowsTheDigestOfAPublishedVector) {
