@@ -13,9 +13,9 @@
 
 #include "api/admin/alarm_rules.hpp"
 #include "api/admin/build_info.hpp"
+#include "api/heavy_work.hpp"
 #include "api/kit/router.hpp"
 #include "api/kit/storage_status.hpp"
-#include "api/learning/worker_port.hpp"
 #include "api/places/plan_work.hpp"
 #include "api/stream/ws_handler.hpp"
 #include "core/base/result.hpp"
@@ -86,7 +86,7 @@ class Application {
     std::function<std::vector<AlarmCondition>()> server_alarms = [] { return std::vector<AlarmCondition>{}; };
     std::function<void(std::string_view request_id, std::string_view what)> log_fault =
         [](std::string_view, std::string_view) {};
-    RunWork run_work = work_inline;  ///< runs the heavy part of a training job
+    RunWork run_work = work_inline;  ///< runs the heavy part of jobs that may run apart from the server
     /// Work that other processes may do; null: every job is this process's.
     WorkStore* work_store{nullptr};
     bool run_jobs_here{true};  ///< where others may run jobs, this process does too

@@ -34,7 +34,7 @@
 #include "api/flight/routes.hpp"
 #include "api/kit/late_writer.hpp"
 #include "api/learning/routes.hpp"
-#include "api/learning/work_desk.hpp"
+#include "api/work/work_desk.hpp"
 #include "api/measurements/demonstration.hpp"
 #include "api/measurements/device_ingest.hpp"
 #include "api/measurements/ingest.hpp"

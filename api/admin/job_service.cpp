@@ -286,6 +286,10 @@ Result<Job> JobService::cancel(const JobId& id) {
     }
     if (!waiting) lanes->canceled.insert(id);
   }
+  if (!waiting && state_->cancel_elsewhere) {  // it may have been handed over since we asked
+    BOOST_OUTCOME_TRY(const bool there, state_->cancel_elsewhere(id));
+    (void)there;
+  }
   if (waiting) {
     // It never ran, so it does not wait for its turn to be told so.
     job.state = JobState::canceled;
@@ -325,6 +329,11 @@ void JobService::State::run(const Task& task) {
   Result<JobEnd> result = make_error(Errc::internal, "");
   const auto ran = guarded("job", [&] { result = task.work(context); });
   if (!ran) result = make_error(Errc::internal, ran.what);
+  if (result && result.value().elsewhere) {
+    // Canceled while it was handed over: whoever asked has found it in neither place.
+    if (is_canceled(job.id) && !is_stopping() && cancel_elsewhere) (void)cancel_elsewhere(job.id).has_value();
+    return;
+  }
   job.finished = clock.now();
   if (result) {
     job.state = JobState::succeeded;

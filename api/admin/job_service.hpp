@@ -29,6 +29,7 @@ class JobContext {
 
 struct JobEnd {
   std::string result_href{}, detail{};
+  bool elsewhere{false};  ///< it has not ended: whoever took it over keeps its state from here on
 };
 
 /// Long work in bounded, visible queues: a strand for each kind, so that a calibration never waits for a

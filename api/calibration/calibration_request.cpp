@@ -137,6 +137,7 @@ CalibrationRequest read_calibration_request(const Json& body, std::vector<FieldE
   out.use_anchor_anchor = fields.boolean("use_anchor_anchor").value_or(true);
   out.site_outline = fields.boolean("site_outline").value_or(true);
   fields.finish();
+  out.body_json = to_wire(body);
   out.settings_json = body.is_object() ? [&] {
     Json settings = body;
     settings.erase("missions");

@@ -48,6 +48,10 @@ Ordered whole(CalibrationApi& s, const Calibration& calibration) {
   ask_whether_moved(s, today);
   Ordered body = calibration_json(today, &s.goals);
   body["published"] = published_in(s, calibration.id);
+  // Of what came with a bundle nobody knows.
+  const auto job = s.jobs.wait(JobId{calibration.id.uuid}, std::chrono::milliseconds(0));
+  body["worker"] = job && !job.value().worker.empty() ? Ordered(job.value().worker) : Ordered(nullptr);
+  body["attempts"] = job ? job.value().attempts : 0;
   return body;
 }
 

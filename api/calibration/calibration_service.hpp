@@ -30,6 +30,10 @@ class ContradictionWatch;
 class JobContext;
 class KitProfiles;
 class JobService;
+class WorkDesk;
+struct CalibrationAnswer;
+struct CalibrationOrder;
+struct JobEnd;
 
 /// Where the search of each anchor begins: true at its bearing and height.
 inline constexpr auto k_initial_words = enum_table<bool>({{"search", false}, {"bearing_height", true}});
@@ -43,6 +47,7 @@ struct CalibrationRequest {
       learn_from;  ///< other flights of the same kit: they tell its bias and lag, not positions
   FlightOptions options;
   std::string settings_json;                                                         ///< as accepted
+  std::string body_json;                                                             ///< what was read
   std::optional<double> max_correction_age_s, max_speed_mps, max_acceleration_mps2;  ///< else the service's
   bool use_profile{true};     ///< the kit's stored profile tells the prior, and learns from these flights
   int iterations{0};          ///< growing parts of each flight solved too, for the report's curves
@@ -59,7 +64,8 @@ struct CalibrationRequest {
 /// Reads the body of POST /calibrations; what is wrong is appended to `errors`.
 CalibrationRequest read_calibration_request(const nlohmann::json& body, std::vector<FieldError>& errors);
 
-/// Batch solves as jobs of kind `calibration`. Thread-safe.
+/// Batch solves as jobs of kind `calibration`: this server reads the flights; they are solved here or, where
+/// there is a desk, by whoever claims them; this server stores what came out. Thread-safe.
 class CalibrationService {
  public:
   struct Deps {
@@ -68,6 +74,7 @@ class CalibrationService {
     SiteStore& sites;
     CalibrationStore& calibrations;
     JobService& jobs;
+    JobStore& job_store;
     const Clock& clock;
     KitProfiles& profiles;
     const ModelRegistry& models;
@@ -77,31 +84,28 @@ class CalibrationService {
     ExclusionStore& exclusions;
     TrackLimits track{};                 ///< what positions are held against where the request does not say
     ContradictionWatch& contradictions;  ///< asked again after each calibration
+    WorkDesk* desk{nullptr};             ///< null: nobody but this server runs jobs
   };
-  explicit CalibrationService(Deps deps) : deps_(deps) {}
+  explicit CalibrationService(Deps deps);
 
   /// queue_full when too many wait; not_found for a mission that is not there.
   Result<Job> submit(CalibrationRequest request);
 
  private:
-  /// A calibration and what the profiles of its kits should learn from it.
-  struct Solved;
-  Result<Solved> solve(const CalibrationRequest& request, const ModelRegistry::Active& models,
-                       JobContext& job);
-  // The steps of solve(), in their order.
-  Result<void> load(const CalibrationRequest& request, const ModelRegistry::Active& models, JobContext& job,
-                    Solved& solved);
-  FlightOptions options_of(const CalibrationRequest& request, JobContext& job) const;
-  /// `raw`: the same without the models, where it is compared or their worth is asked for; else it stays
-  /// empty.
-  Result<void> solve_by_models(const CalibrationRequest& request, const FlightOptions& options,
-                               JobContext& job, Solved& solved, Solved& raw);
-  void conclude(const CalibrationRequest& request, const ModelRegistry::Active& models, Solved& solved,
-                const Solved& raw) const;
+  struct Prepared;
+  struct Reading;
+  Result<Prepared> prepare(const CalibrationRequest& request, const ModelRegistry::Active& models,
+                           const Reading& reading);
+  // The steps of prepare(), in their order.
+  Result<void> load(const CalibrationRequest& request, const ModelRegistry::Active& models,
+                    const Reading& reading, Prepared& out);
+  FlightOptions options_of(const CalibrationRequest& request) const;
+  Result<void> ask_kits(const CalibrationRequest& request, Prepared& out);
 
-  Result<void> solve_kits(const CalibrationRequest& request, const FlightOptions& options, Solved& solved);
-  Result<void> solve_kit(const CalibrationRequest& request, const FlightOptions& options, Solved& solved,
-                         const std::string& kit);
+  Result<bool> handed_over(const CalibrationRequest& request, const Prepared& prepared, JobContext& job);
+  Result<std::string> message_anew(const JobId& id);
+  Result<JobEnd> take_in(const Job& job, const std::string& text);
+  Result<JobEnd> keep(const JobId& job, const CalibrationOrder& order, CalibrationAnswer answer);
   Deps deps_;
 };
 

@@ -6,7 +6,7 @@
 #include "api/admin/job_service.hpp"
 #include "api/learning/model_artifact.hpp"
 #include "api/learning/model_signer.hpp"
-#include "api/learning/work_desk.hpp"
+#include "api/work/work_desk.hpp"
 #include "core/base/sha256.hpp"
 #include "core/base/to_wire.hpp"
 
@@ -29,8 +29,8 @@ TrainingService::TrainingService(Deps deps) : deps_(std::move(deps)) {
                      BOOST_OUTCOME_TRY(const auto run, deps_.runs.run(TrainingRunId{id.uuid}));
                      return message_of(run);
                    },
-                   .take_in = [this](const JobId& id, const std::string& answer) -> Result<JobEnd> {
-                     BOOST_OUTCOME_TRY(const auto run, deps_.runs.run(TrainingRunId{id.uuid}));
+                   .take_in = [this](const Job& job, const std::string& answer) -> Result<JobEnd> {
+                     BOOST_OUTCOME_TRY(const auto run, deps_.runs.run(TrainingRunId{job.id.uuid}));
                      return take_in(run, answer);
                    }});
 }

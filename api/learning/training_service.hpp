@@ -3,7 +3,7 @@
 #include <functional>
 #include <string>
 
-#include "api/learning/worker_port.hpp"
+#include "api/work/worker_port.hpp"
 #include "core/ports/job_store.hpp"
 #include "core/ports/learning_store.hpp"
 

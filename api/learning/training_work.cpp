@@ -1,10 +1,11 @@
+#include "api/learning/training_work.hpp"
+
 #include <nlohmann/json.hpp>
 
 #include "api/kit/reader.hpp"
 #include "api/learning/model_artifact.hpp"
 #include "api/learning/training_parts.hpp"
 #include "api/learning/training_request.hpp"
-#include "api/learning/worker_port.hpp"
 #include "core/base/to_wire.hpp"
 
 namespace anchord::api {
@@ -45,8 +46,8 @@ Result<std::string> train_work(const Json& message, const std::stop_token& stop,
 
 }  // namespace
 
-Result<std::string> do_work(std::string_view message, const std::stop_token& stop,
-                            const WorkProgressSink& progress) {
+Result<std::string> do_training_work(std::string_view message, const std::stop_token& stop,
+                                     const WorkProgressSink& progress) {
   const auto json = Json::parse(message, nullptr, false);
   if (!json.is_object()) return make_error(Errc::bad_frame, "the message is not a JSON object");
   try {
@@ -55,15 +56,6 @@ Result<std::string> do_work(std::string_view message, const std::stop_token& sto
     return make_error(Errc::bad_frame, fault.what());
   }
   return make_error(Errc::bad_frame, "unknown kind of work");
-}
-
-Result<std::string> work_inline(const std::string& message, const WorkProgressSink& progress,
-                                const std::function<bool()>& canceled) {
-  std::stop_source stop;
-  return do_work(message, stop.get_token(), [&](const WorkProgress& p) {
-    if (canceled()) stop.request_stop();
-    progress(p);
-  });
 }
 
 }  // namespace anchord::api

@@ -10,7 +10,7 @@
 #include <string_view>
 #include <vector>
 
-#include "api/learning/worker_port.hpp"
+#include "api/work/worker_port.hpp"
 #include "core/floor_plan/georeference.hpp"
 #include "core/floor_plan/tiles.hpp"
 #include "core/types/place.hpp"

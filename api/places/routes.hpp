@@ -5,7 +5,7 @@
 #include <string>
 
 #include "api/kit/audit.hpp"
-#include "api/learning/worker_port.hpp"
+#include "api/work/worker_port.hpp"
 #include "core/base/locked.hpp"
 
 namespace anchord {

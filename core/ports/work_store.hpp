@@ -17,6 +17,8 @@ namespace anchord {
 
 /// Three begun attempts without an end are enough to say that there will be none.
 inline constexpr int k_work_attempts = 3;
+/// A longer result is not even read.
+inline constexpr std::int64_t k_most_result_bytes = std::int64_t{512} << 20;
 
 struct NewWork {
   JobId job{};
@@ -86,6 +88,7 @@ class WorkStore {
     std::string worker, version;
     std::chrono::milliseconds lease{15'000};  ///< how long the claim holds without a beat
     std::chrono::milliseconds left_alone{0};  ///< only what waits for so long already
+    std::string kind{};                       ///< empty: any
   };
   /// The oldest that waits or whose claim has run out; nothing: there is none.
   virtual Result<std::optional<WorkClaim>> claim(const Wish& wish) = 0;

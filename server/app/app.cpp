@@ -66,9 +66,9 @@ std::string settings_text(const Config& config) {
   return out;
 }
 
-/// Backup, calibration, discovery, training, pictures of plans, the archive of impulse responses, and room
-/// for one more.
-constexpr std::size_t k_kinds_of_jobs = 7;
+/// Backup, calibration, discovery, training, pictures of plans, the archive of impulse responses, what of
+/// calibrations runs here although workers may, and room for one more.
+constexpr std::size_t k_kinds_of_jobs = 8;
 
 /// For the commands of this machine: a plain address if there is one, and never one that is only for
 /// listening.

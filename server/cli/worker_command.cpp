@@ -51,10 +51,10 @@ int run(Options& options) {
 }  // namespace
 
 void add_worker_command(CLI::App& app, int& exit_code) {
-  auto* command =
-      app.add_subcommand("worker",
-                         "Run training runs of a server on this machine: with --database of its PostgreSQL. "
-                         "Without --database this is the process that a server starts by itself");
+  auto* command = app.add_subcommand(
+      "worker",
+      "Run calibrations and training runs of a server on this machine: with --database of its PostgreSQL. "
+      "Without --database this is the process that a server starts by itself");
   const auto options = std::make_shared<Options>();
   command
       ->add_option(

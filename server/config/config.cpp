@@ -65,7 +65,8 @@ constexpr std::array k_options = {
            count},
     Option{"backup.dir", "", "folder of the backups, if possible on another disk [DATA_DIR/backups]"},
     Option{"jobs.run_here", "on",
-           "with PostgreSQL: on: training runs that no worker takes are run by the server; off: they run "
+           "with PostgreSQL: on: calibrations and training runs that no worker takes are run by the server; "
+           "off: they run "
            "only on workers (anchord worker)",
            choice, "on|off"},
     Option{"jobs.lease_s", "15",

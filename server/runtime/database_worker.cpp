@@ -5,7 +5,7 @@
 #include <array>
 #include <thread>
 
-#include "api/learning/work_runner.hpp"
+#include "api/work/work_runner.hpp"
 #include "server/runtime/logging.hpp"
 #include "server/runtime/worker_process.hpp"
 #include "server/storage/work_store.hpp"

@@ -16,6 +16,8 @@
 #include <stop_token>
 #include <vector>
 
+#include "api/calibration/calibration_work.hpp"
+#include "api/heavy_work.hpp"
 #include "api/places/plan_work.hpp"
 #include "core/base/errc_words.hpp"
 #include "core/base/guard.hpp"
@@ -92,6 +94,15 @@ void settle_for(const std::string& message) {
   close_the_doors(page);
 }
 
+/// What to do about it where the memory did not suffice.
+std::string too_little_memory(const std::string& allowed, bool plan, bool calibration) {
+  const std::string than = " needs more memory than the " + allowed + " a worker may use: ";
+  if (plan) return "the picture" + than + "scale it down";
+  if (calibration) return "the calibration" + than + "calibrate fewer flights at once";
+  return "the training" + than +
+         "use a data set of means or medians, fewer rows, features or trees, and start the run again";
+}
+
 std::string allowed_memory() {
   rlimit now{};
   getrlimit(RLIMIT_DATA, &now);
@@ -137,31 +148,31 @@ int worker_main() {
           {"fraction", p.fraction},
           {"detail", p.detail}});
   };
-  const bool plan = api::is_plan_work(message);
+  const bool plan = api::is_plan_work(message), calibration = api::is_calibration_work(message);
   const auto programs = [cpu_s = plan ? api::plan_work_cpu_s(message) : 0](
                             const std::vector<std::string>& command, std::string_view input,
                             std::size_t max_output) {
     return run_program(command, input, max_output, cpu_s);
   };
-  const auto ran = guarded(plan ? "floor plan" : "training", [&] {  // the door of jobs, in this process
-    try {
-      result = plan ? api::do_plan_work(message, stop.get_token(), told, programs)
-                    : api::do_work(message, stop.get_token(), told);
-    } catch (const std::bad_alloc&) {
-      message.clear();
-      message.shrink_to_fit();  // room for the answer
-      result =
-          plan ? make_error(Errc::invalid_argument, "the picture needs more memory than the " +
-                                                        allowed_memory() + " a worker may use: scale it down")
-               : make_error(Errc::unsupported,
-                            "the training needs more memory than the " + allowed_memory() +
-                                " a worker may use: use a data set of means or medians, fewer "
-                                "rows, features or trees, and start the run again");
-    }
-  });
+  // The door of jobs, in this process.
+  const auto ran = guarded(plan          ? "floor plan"
+                           : calibration ? "calibration"
+                                         : "training",
+                           [&] {
+                             try {
+                               result = plan ? api::do_plan_work(message, stop.get_token(), told, programs)
+                                             : api::do_work(message, stop.get_token(), told);
+                             } catch (const std::bad_alloc&) {
+                               message.clear();
+                               message.shrink_to_fit();  // room for the answer
+                               result = make_error(plan ? Errc::invalid_argument : Errc::unsupported,
+                                                   too_little_memory(allowed_memory(), plan, calibration));
+                             }
+                           });
   if (!ran) {
-    result = make_error(Errc::link_lost, "the worker process failed: " + ran.what +
-                                             (plan ? "" : "; the run, its data and settings are kept"));
+    result = make_error(Errc::link_lost,
+                        "the worker process failed: " + ran.what +
+                            (plan || calibration ? "" : "; the run, its data and settings are kept"));
   }
   if (result)
     send({{"op", "done"}}, &result.value());  // as it is: pictures are no text

@@ -11,6 +11,7 @@
 #include <nlohmann/json.hpp>
 #include <vector>
 
+#include "api/calibration/calibration_work.hpp"
 #include "api/places/plan_work.hpp"
 #include "core/base/errc_words.hpp"
 #include "core/base/text.hpp"
@@ -44,27 +45,30 @@ class Socket {
 };
 
 /// What most often lies behind a worker's death, and what helps.
-std::string cause_of(int signal, bool plan) {
-  if (plan) return "a fault of the decoder or too little memory";
+std::string cause_of(int signal, const std::string& message) {
+  if (api::is_plan_work(message)) return "a fault of the decoder or too little memory";
+  const bool calibration = api::is_calibration_work(message);
   switch (signal) {
     case SIGKILL:
-      return "usually because the machine had no memory left; free some memory, or train on fewer rows or a "
-             "smaller "
-             "grid, "
-             "and start the run again";
+      return std::string("usually because the machine had no memory left; free some memory, or ") +
+             (calibration ? "calibrate fewer flights at once"
+                          : "train on fewer rows or a smaller grid, and start the run again");
     case SIGXCPU:
-      return "it had used its 24 hours of processor time; train on fewer rows or a smaller grid";
+      return std::string("it had used its 24 hours of processor time; ") +
+             (calibration ? "calibrate fewer flights at once" : "train on fewer rows or a smaller grid");
     default:
-      return "a fault of the trainer or too little memory; the run, its data and settings are kept: try "
-             "fewer "
-             "rows or another method, and report the fault";
+      return calibration
+                 ? "a fault of the solver or too little memory; the flights are kept: report the fault"
+                 : "a fault of the trainer or too little memory; the run, its data and settings are kept: "
+                   "try fewer rows or another method, and report the fault";
   }
 }
 
 /// A child that is always collected: killed where it still runs when this goes.
 class Child {
  public:
-  Child(pid_t pid, std::optional<int> plan_cpu_s) : pid_(pid), plan_cpu_s_(plan_cpu_s) {}
+  /// message  outlives it
+  Child(pid_t pid, const std::string& message) : pid_(pid), message_(message) {}
   ~Child() {
     if (pid_ <= 0) return;
     kill();
@@ -79,19 +83,20 @@ class Child {
     while (::waitpid(pid_, &status, 0) < 0 && errno == EINTR) {
     }
     pid_ = 0;
-    if (WIFSIGNALED(status) && WTERMSIG(status) == SIGXCPU && plan_cpu_s_) return api::too_busy(*plan_cpu_s_);
+    if (WIFSIGNALED(status) && WTERMSIG(status) == SIGXCPU && api::is_plan_work(message_))
+      return api::too_busy(api::plan_work_cpu_s(message_));
     if (WIFSIGNALED(status))
-      return make_error(Errc::link_lost,
-                        "the worker process was ended by signal " + std::to_string(WTERMSIG(status)) + " (" +
-                            strsignal(WTERMSIG(status)) +
-                            "): " + cause_of(WTERMSIG(status), plan_cpu_s_.has_value()) + when);
+      return make_error(Errc::link_lost, "the worker process was ended by signal " +
+                                             std::to_string(WTERMSIG(status)) + " (" +
+                                             strsignal(WTERMSIG(status)) +
+                                             "): " + cause_of(WTERMSIG(status), message_) + when);
     return make_error(Errc::link_lost, "the worker process ended with code " +
                                            std::to_string(WEXITSTATUS(status)) + " without an answer" + when);
   }
 
  private:
   pid_t pid_;
-  std::optional<int> plan_cpu_s_;  ///< it works on the picture of a plan, for so long
+  const std::string& message_;
 };
 
 Result<pid_t> spawn(const std::filesystem::path& program, int socket) {
@@ -134,7 +139,7 @@ Result<std::string> run(const std::filesystem::path& program, const std::string&
     return make_error(Errc::internal, std::string("cannot start a worker process: ") + std::strerror(errno));
   Socket ours(ends[0]), theirs(ends[1]);
   BOOST_OUTCOME_TRY(const auto pid, spawn(program, theirs.fd()));
-  Child child(pid, api::is_plan_work(message) ? std::optional(api::plan_work_cpu_s(message)) : std::nullopt);
+  Child child(pid, message);
   theirs.close();
   if (!write_frame(ours.fd(), message)) return child.end(" before it began");
   std::optional<Steady::time_point> asked_to_stop;

@@ -2,7 +2,7 @@
 
 #include <filesystem>
 
-#include "api/learning/worker_port.hpp"
+#include "api/work/worker_port.hpp"
 
 namespace anchord::server {
 

@@ -19,14 +19,17 @@ constexpr const char* k_all =
     "fault, "
     "CASE WHEN state = 0 THEN now_ns() - open_t_ns WHEN state = 1 AND lease_t_ns < now_ns() THEN now_ns() - "
     "lease_t_ns ELSE 0 END FROM work ORDER BY job_id";
-constexpr const char* k_outcome = "SELECT state, error_code, error_text, result FROM work WHERE job_id = ?1";
+constexpr const char* k_outcome =
+    "SELECT state, error_code, error_text, octet_length(result), CASE WHEN octet_length(result) > ?2 THEN '' "
+    "ELSE result END FROM work WHERE job_id = ?1";
 constexpr const char* k_state = "SELECT state FROM work WHERE job_id = ?1";
 constexpr const char* k_cancel_open =
     "UPDATE work SET state = 2, error_code = 'canceled', error_text = 'canceled' WHERE job_id = ?1";
 constexpr const char* k_cancel_claimed = "UPDATE work SET cancel_wanted = 1 WHERE job_id = ?1";
 constexpr const char* k_claimable =
     "SELECT EXISTS (SELECT 1 FROM work WHERE version = ?1 AND cancel_wanted = 0 AND attempts < max_attempts "
-    "AND ((state = 0 AND open_t_ns <= now_ns() - ?2) OR (state = 1 AND lease_t_ns < now_ns() - ?2)))";
+    "AND ((state = 0 AND open_t_ns <= now_ns() - ?2) OR (state = 1 AND lease_t_ns < now_ns() - ?2)) AND "
+    "(?3 = '' OR kind = ?3))";
 constexpr const char* k_claim =
     "UPDATE work SET fault = CASE WHEN state = 1 THEN 'worker ' || worker || ' no longer answered' ELSE "
     "fault END, state = 1, fence = fence + 1, attempts = attempts + 1, worker = ?1, lease_t_ns = now_ns() + "
@@ -34,14 +37,15 @@ constexpr const char* k_claim =
     "fraction = 0, stage = 'load', detail = '' WHERE job_id = (SELECT job_id FROM work WHERE version = ?3 "
     "AND cancel_wanted = 0 AND attempts < max_attempts AND ((state = 0 AND open_t_ns <= now_ns() - ?4) OR "
     "(state "
-    "= 1 AND lease_t_ns < now_ns() - ?4)) ORDER BY open_t_ns, job_id LIMIT 1 FOR UPDATE SKIP LOCKED) "
+    "= 1 AND lease_t_ns < now_ns() - ?4)) AND (?5 = '' OR kind = ?5) ORDER BY open_t_ns, job_id LIMIT 1 FOR "
+    "UPDATE SKIP LOCKED) "
     "RETURNING job_id, kind, message, fence, attempts";
 // The fence moves on too: who comes back later than this finds that it has nothing any more.
 constexpr const char* k_end_hopeless =
     "UPDATE work SET state = 2, fence = fence + 1, error_code = CASE WHEN cancel_wanted = 1 THEN 'canceled' "
     "ELSE 'link_lost' END, error_text = CASE WHEN cancel_wanted = 1 THEN 'canceled' ELSE 'worker ' || worker "
     "|| ' no longer answers; ' || attempts || ' attempts were begun and none came to an end: look at the "
-    "logs of the workers and at their memory, then start the run again' END WHERE state = 1 AND lease_t_ns < "
+    "logs of the workers and at their memory, then start it again' END WHERE state = 1 AND lease_t_ns < "
     "now_ns() AND (cancel_wanted = 1 OR attempts >= max_attempts)";
 constexpr const char* k_beat =
     "UPDATE work SET lease_t_ns = now_ns() + ?3, fraction = ?4, stage = ?5, detail = ?6 WHERE job_id = ?1 "
@@ -125,12 +129,18 @@ class SqlWorkStore final : public WorkStore {
   Result<WorkOutcome> outcome(const JobId& job) override {
     return read_value<WorkOutcome>(gate_, [&](Connection& c) -> Result<WorkOutcome> {
       Query query(c, k_outcome);
-      query << job;
+      query << job << k_most_result_bytes;
       if (!query.step()) return absent("work of job", job);
       if (query.one_of(k_work_state_words) != WorkState::done)
         return make_error(Errc::conflict, "job " + to_string(job) + " is not done");
       const auto code = query.text();
       auto text = query.text();
+      const auto bytes = query.integer();
+      if (bytes > k_most_result_bytes)
+        return WorkOutcome{
+            {},
+            make_error(Errc::link_lost, "the result is of " + std::to_string(bytes) + " bytes; " +
+                                            std::to_string(k_most_result_bytes) + " are allowed")};
       if (code.empty()) return WorkOutcome{query.text(), std::nullopt};
       const auto known = k_errc_words.parse("error_code", code);
       return WorkOutcome{{}, make_error(known ? known.value() : Errc::internal, std::move(text))};
@@ -163,14 +173,14 @@ class SqlWorkStore final : public WorkStore {
     // Who finds nothing, which is most often so, has written nothing.
     BOOST_OUTCOME_TRY(const auto there, read_value<bool>(gate_, [&](Connection& c) -> Result<bool> {
                         Query query(c, k_claimable);
-                        query << wish.version << ns(wish.left_alone);
+                        query << wish.version << ns(wish.left_alone) << wish.kind;
                         return query.step() && query.integer() != 0;
                       }));
     if (!there) return std::optional<WorkClaim>{};
     return write_value<std::optional<WorkClaim>>(
         gate_, 1, [&](Connection& c) -> Result<std::optional<WorkClaim>> {
           Query query(c, k_claim);
-          query << wish.worker << ns(wish.lease) << wish.version << ns(wish.left_alone);
+          query << wish.worker << ns(wish.lease) << wish.version << ns(wish.left_alone) << wish.kind;
           if (!query.step()) return std::optional<WorkClaim>{};
           WorkClaim claim;
           claim.job = query.id<JobId>();

@@ -106,10 +106,12 @@ export class Postgres {
   /** What one statement prints, columns apart by a bar. */
   async psql(sql, database = 'postgres') {
     if (!(await this.listens())) throw new Error('nobody listens');
-    const words = ['-X', '-A', '-t', '-v', 'ON_ERROR_STOP=1', '-c', sql, this.url(database)];
-    return execFileSync('psql', words, {
+    const long = sql.length > 100_000, // more than an argument may have
+      words = ['-X', '-A', '-t', '-v', 'ON_ERROR_STOP=1', ...(long ? ['-q', '-f', '-'] : ['-c', sql])];
+    return execFileSync('psql', [...words, this.url(database)], {
       env: { ...process.env, ...this.env },
       encoding: 'utf8',
+      input: long ? sql : '',
       stdio: 'pipe',
     }).trim();
   }

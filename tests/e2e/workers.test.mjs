@@ -1,14 +1,14 @@
 // Training runs on workers of other processes, over a real PostgreSQL: the same bytes as on the server, a worker that is killed or
 // stopped in the middle, cancel, restarts of server and database, and attempts that all fail.
 import assert from 'node:assert/strict';
-import { spawn } from 'node:child_process';
-import { readFileSync, readdirSync } from 'node:fs';
+import { readFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { after, before, test } from 'node:test';
 import { Contract, checked } from './contract.mjs';
 import { endless, quick, values } from './learning_bodies.mjs';
 import { startPostgres } from './postgres.mjs';
-import { binary, eventually, root, run, startServer } from './server.mjs';
+import { eventually, root, run, startServer } from './server.mjs';
+import { allow_workers, endWorkers, startWorker } from './worker.mjs';
 
 const contract = new Contract();
 /** Takes some seconds: long enough to be interrupted, short enough to be waited for. */
@@ -17,58 +17,8 @@ const some_seconds = {
   grid: { svm: { c: values(12, 0.1, 1.4), gamma: values(8, 0.001, 1.5) } },
 };
 let postgres, server, call;
-const workers = new Set();
 
-/** A worker with the rights that docs/workers.md names. */
-class Worker {
-  constructor(name) {
-    this.name = name;
-    this.log = '';
-    const args = ['worker', '--database', postgres.url('anchord', { user: 'anchord_worker' }), '--name', name];
-    this.child = spawn(binary, [...args, '--lease-s', '1'], {
-      stdio: ['ignore', 'pipe', 'inherit'],
-      env: { ...process.env, ...postgres.env },
-    });
-    this.child.stdout.setEncoding('utf8').on('data', (text) => (this.log += text));
-    this.exited = new Promise((done) => this.child.once('exit', (code, signal) => done({ code, signal })));
-    workers.add(this);
-  }
-  says(text) {
-    return eventually(`${this.name} says "${text}"`, () => this.log.includes(text), 15_000);
-  }
-  async end(signal = 'SIGTERM') {
-    this.child.kill(signal);
-    workers.delete(this);
-    return this.exited;
-  }
-  /** The processes that compute for it. */
-  computing() {
-    return readdirSync('/proc').filter((name) => {
-      if (!/^\d+$/.test(name)) return false;
-      try {
-        const stat = readFileSync(`/proc/${name}/stat`, 'utf8');
-        const [state, parent] = stat.slice(stat.lastIndexOf(')') + 2).split(' ');
-        return stat.includes('(anchord-worker)') && Number(parent) === this.child.pid && state !== 'Z';
-      } catch {
-        return false; // it ended while we looked
-      }
-    });
-  }
-  /** Holds its job in the middle, however quick the machine is, until thaw(). */
-  async freeze() {
-    await eventually(`${this.name} computes`, () => this.computing().length > 0, 15_000, 5);
-    [this.frozen] = this.computing();
-    process.kill(Number(this.frozen), 'SIGSTOP');
-  }
-  thaw() {
-    process.kill(Number(this.frozen), 'SIGCONT');
-  }
-}
-async function started(name) {
-  const worker = new Worker(name);
-  await worker.says('waiting for jobs');
-  return worker;
-}
+const started = (name) => startWorker(postgres, name);
 
 const job_of = async (id) => (await call('GET', `/api/v1/jobs/${id}`, { expect: 200 })).json;
 const begin = async (body) => (await call('POST', '/api/v1/training-runs', { expect: 202, json: body })).json.id;
@@ -112,13 +62,7 @@ before(async () => {
     env: { ...postgres.env, ANCHORD_JOBS_LEASE_S: '1' },
   });
   call = checked(server, contract);
-  await postgres.psql(
-    `CREATE ROLE anchord_worker LOGIN PASSWORD '${postgres.password}';` +
-      'GRANT SELECT ON schema_migration TO anchord_worker;' +
-      'GRANT SELECT, UPDATE ON work TO anchord_worker;' +
-      'GRANT SELECT, INSERT, UPDATE, DELETE ON worker TO anchord_worker',
-    'anchord',
-  );
+  await allow_workers(postgres);
   await call('POST', '/api/v1/campaigns', { expect: 201, json: { name: 'campaign' } });
   await call('POST', '/api/v1/campaigns/campaign/samples', {
     expect: 200,
@@ -131,10 +75,7 @@ before(async () => {
   });
 });
 after(async () => {
-  for (const worker of [...workers]) {
-    worker.child.kill('SIGCONT');
-    await worker.end('SIGKILL');
-  }
+  await endWorkers();
   await server?.dispose();
   await postgres?.dispose();
 });

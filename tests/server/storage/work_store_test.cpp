@@ -43,13 +43,14 @@ class PostgresWork : public testing::Test {
     EXPECT_TRUE(opened) << opened.error().message;
     return std::move(opened).value();
   }
-  JobId offer(const std::string& message = "m", int max_attempts = 3, const std::string& version = "1") {
+  JobId offer(const std::string& message = "m", int max_attempts = 3, const std::string& version = "1",
+              const std::string& kind = "training") {
     Job job;
     job.id = JobId{make_uuid_v7(UtcTime{k_noon.ns + n_++})};
-    job.kind = "training";
+    job.kind = kind;
     job.created = k_noon;
     EXPECT_TRUE(db_->stores().jobs.insert(job));
-    EXPECT_TRUE(server_->offer({job.id, "training", version, message, max_attempts}));
+    EXPECT_TRUE(server_->offer({job.id, kind, version, message, max_attempts}));
     return job.id;
   }
   static WorkStore::Wish wish(const std::string& worker, milliseconds lease = std::chrono::seconds(60)) {
@@ -83,6 +84,26 @@ TEST_F(PostgresWork, GivesTheOldestToWhoAsksAndTheSameToNobodyElse) {
   EXPECT_EQ(one->attempt, 1);
   EXPECT_EQ(two->job, b);
   EXPECT_FALSE(first_->claim(wish("w1")).value());
+}
+
+TEST_F(PostgresWork, GivesOfOneKindAloneToWhoAsksForThat) {
+  const auto older = offer("older", 3, "1", "training"), newer = offer("newer", 3, "1", "calibration");
+  auto of_kind = wish("w1");
+  of_kind.kind = "calibration";
+  EXPECT_EQ(first_->claim(of_kind).value()->job, newer);
+  EXPECT_FALSE(first_->claim(of_kind).value());
+  of_kind.kind = "";
+  EXPECT_EQ(first_->claim(of_kind).value()->job, older);
+}
+
+TEST_F(PostgresWork, AResultLongerThanAnyIsNotRead) {
+  const auto job = offer();
+  ASSERT_TRUE(first_->claim(wish("w1")).value());
+  sql::PostgresConnection(address()).execute("UPDATE work SET state = 2, result = repeat('x', 536870913)");
+  const auto outcome = server_->outcome(job);
+  ASSERT_TRUE(outcome) << outcome.error().message;
+  ASSERT_TRUE(outcome.value().error);
+  EXPECT_THAT(outcome.value().error->message, HasSubstr("536870913 bytes; 536870912 are allowed"));
 }
 
 TEST_F(PostgresWork, TwentyWorksAmongEightWhoAskAtOnceAreGivenOnceEach) {

@@ -1,4 +1,4 @@
-#include "api/learning/work_runner.hpp"
+#include "api/work/work_runner.hpp"
 
 #include <optional>
 #include <thread>
@@ -20,11 +20,11 @@ bool of_the_machine(const Error& error) { return error.code == Errc::link_lost; 
 
 }  // namespace
 
-Result<bool> WorkRunner::run_one(std::chrono::milliseconds left_alone,
-                                 const std::function<bool()>& stopping) {
+Result<bool> WorkRunner::run_one(std::chrono::milliseconds left_alone, const std::function<bool()>& stopping,
+                                 const std::string& kind) {
   if (stopping()) return false;
   BOOST_OUTCOME_TRY(const auto claim,
-                    deps_.work.claim({deps_.worker, deps_.version, deps_.lease, left_alone}));
+                    deps_.work.claim({deps_.worker, deps_.version, deps_.lease, left_alone, kind}));
   if (!claim) return false;
   deps_.log("job claimed", *claim, "");
   run(*claim, stopping);

@@ -4,7 +4,7 @@
 #include <functional>
 #include <string>
 
-#include "api/learning/worker_port.hpp"
+#include "api/work/worker_port.hpp"
 #include "core/ports/work_store.hpp"
 
 namespace anchord::api {
@@ -28,8 +28,10 @@ class WorkRunner {
   /// One work from its claim to its end. False: there was none. Blocks.
   /// left_alone  only what waits for so long already
   /// stopping    asked often; true: the work is given back and begins anew elsewhere
+  /// kind        of the work; empty: any
   /// errors      those of the store, before anything was claimed
-  Result<bool> run_one(std::chrono::milliseconds left_alone, const std::function<bool()>& stopping);
+  Result<bool> run_one(std::chrono::milliseconds left_alone, const std::function<bool()>& stopping,
+                       const std::string& kind = {});
 
  private:
   void run(const WorkClaim& claim, const std::function<bool()>& stopping);

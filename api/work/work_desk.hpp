@@ -9,7 +9,7 @@
 
 #include "api/admin/alarm_rules.hpp"
 #include "api/admin/job_service.hpp"
-#include "api/learning/worker_port.hpp"
+#include "api/work/worker_port.hpp"
 #include "core/ports/work_store.hpp"
 
 namespace anchord::api {
@@ -33,7 +33,7 @@ class WorkDesk {
     JobService& jobs;
     EventLog& events;
     const Clock& clock;
-    Executor& on;  ///< one strand, for what is run here
+    Executor& on;  ///< a strand for each kind of what is run here
     RunWork run;
     Options options;
   };
@@ -43,7 +43,9 @@ class WorkDesk {
     std::function<Result<std::string>(const JobId& job)> message;
     /// What a result becomes. Called on the desk's thread, and again after a server that was killed between
     /// this and the end of the job: it finds out by itself whether it was done already.
-    std::function<Result<JobEnd>(const JobId& job, const std::string& result)> take_in;
+    std::function<Result<JobEnd>(const Job& job, const std::string& result)> take_in;
+    double done_before{0};       ///< of the whole, when it is handed out
+    bool of_one_version{false};  ///< a result that was made by another version is made again
   };
 
   explicit WorkDesk(Deps deps);
@@ -58,9 +60,13 @@ class WorkDesk {
   void stop();
 
   /// queue_full when JobService::k_max_queued of the kind wait.
+  Result<void> room_for(const std::string& kind);
   Result<Job> submit(std::string kind, std::string request_json, std::string message, const JobId& id);
   /// The same job again. conflict while it waits, runs or has succeeded.
   Result<Job> restart(const JobId& id, std::string message);
+  /// A job that JobService began here goes on wherever it is claimed: it waits again, as it is given. Its
+  /// work returns JobEnd::elsewhere then.
+  Result<void> hand_over(Job job, std::string message);
   /// Jobs wait and nobody is there who would run them; asks nobody.
   std::vector<AlarmCondition> alarms() const;
 

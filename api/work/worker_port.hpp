@@ -2,9 +2,7 @@
 
 #include <cstddef>
 #include <functional>
-#include <stop_token>
 #include <string>
-#include <string_view>
 
 #include "core/base/result.hpp"
 
@@ -24,13 +22,5 @@ using WorkProgressSink = std::function<void(const WorkProgress&)>;
 /// canceled  asked a few times a second at least
 using RunWork = std::function<Result<std::string>(
     const std::string& message, const WorkProgressSink& progress, const std::function<bool()>& canceled)>;
-
-/// The work itself, by the message's "kind". Pure: no store, no socket. errors: bad_frame (the message)
-Result<std::string> do_work(std::string_view message, const std::stop_token& stop,
-                            const WorkProgressSink& progress);
-
-/// do_work on the calling thread.
-Result<std::string> work_inline(const std::string& message, const WorkProgressSink& progress,
-                                const std::function<bool()>& canceled);
 
 }  // namespace anchord::api

@@ -1,11 +1,12 @@
-#include "api/learning/work_desk.hpp"
+#include "api/work/work_desk.hpp"
 
 #include <algorithm>
 #include <condition_variable>
+#include <set>
 
 #include "api/admin/event_log.hpp"
 #include "api/kit/problem.hpp"
-#include "api/learning/work_runner.hpp"
+#include "api/work/work_runner.hpp"
 #include "core/base/guard.hpp"
 #include "core/base/locked.hpp"
 #include "core/ports/executor.hpp"
@@ -43,7 +44,8 @@ struct WorkDesk::State {
                 [](std::string_view, const WorkClaim&, std::string_view) {}}) {}
 
   struct Now {
-    bool stopping{false}, look{true}, busy{false};
+    bool stopping{false}, look{true};
+    std::set<std::string> busy{};  ///< kinds of which one runs here
     std::string alarm{};
   };
   Deps deps;
@@ -51,7 +53,7 @@ struct WorkDesk::State {
   std::map<std::string, Kind> kinds;
   Locked<Now> now;
   std::condition_variable changed;
-  std::unique_ptr<Executor> strand;
+  std::map<std::string, std::unique_ptr<Executor>> strands;  ///< of the thread alone, by kind
   Thread thread;
   bool anything{true};  ///< of the thread alone: something was out when it looked last
 
@@ -69,11 +71,18 @@ struct WorkDesk::State {
   void work();
   Result<void> round();
   Result<void> follow(const WorkStatus& status);
+  bool made_by_another(const WorkStatus& status) const;
   Result<void> hand_out_anew(const WorkStatus& status);
   Result<void> conclude(const WorkStatus& status, Job job);
   Result<void> look_after_waiting(const std::vector<WorkStatus>& all);
   Result<Job> handed_out(Job job, std::string message);
-  void run_here(std::chrono::milliseconds left_alone);
+  void run_here(const std::string& kind, std::chrono::milliseconds left_alone);
+  /// How far the job is, of what its work says.
+  double share(const std::string& kind, double of_work) const {
+    const auto how = kinds.find(kind);
+    const double before = how == kinds.end() ? 0 : how->second.done_before;
+    return before + (k_share_of_work - before) * of_work;
+  }
   void raise(std::string alarm) {
     auto n = now.lock();
     n->alarm = std::move(alarm);
@@ -115,11 +124,12 @@ Result<void> WorkDesk::State::follow(const WorkStatus& status) {
   Job job = before;
   job.attempts = status.attempts;
   job.worker = status.worker;
+  if (status.version != deps.options.version && (status.waiting_s > 0 || made_by_another(status)))
+    return hand_out_anew(status);
   if (status.state == WorkState::done) return conclude(status, std::move(job));
-  if (status.waiting_s > 0 && status.version != deps.options.version) return hand_out_anew(status);
   const bool claimed = status.state == WorkState::claimed;
   job.state = claimed ? JobState::running : JobState::queued;
-  job.fraction = claimed ? k_share_of_work * status.fraction : 0;
+  job.fraction = share(status.kind, claimed ? status.fraction : 0);
   job.stage = status.stage;
   job.detail = claimed ? status.detail : status.fault;
   if (claimed && !job.started) job.started = deps.clock.now();
@@ -130,6 +140,11 @@ Result<void> WorkDesk::State::follow(const WorkStatus& status) {
                         std::to_string(status.attempts) + " of " + std::to_string(status.max_attempts) +
                         " is of " + status.worker);
   return deps.jobs.save(job);
+}
+
+bool WorkDesk::State::made_by_another(const WorkStatus& status) const {
+  const auto how = kinds.find(status.kind);
+  return status.state == WorkState::done && how != kinds.end() && how->second.of_one_version;
 }
 
 /// The server was updated meanwhile: its workers would never claim what the former one wrote.
@@ -149,7 +164,7 @@ Result<void> WorkDesk::State::conclude(const WorkStatus& status, Job job) {
   } else if (const auto how = kinds.find(job.kind); how != kinds.end()) {
     job.stage = "store";
     job.fraction = k_share_of_work;
-    const auto ran = guarded("job", [&] { end = how->second.take_in(job.id, outcome.result); });
+    const auto ran = guarded("job", [&] { end = how->second.take_in(job, outcome.result); });
     if (!ran) end = make_error(Errc::internal, ran.what);
   }
   if (!end && store_away(end.error())) return end.error();  // the result is kept: the next round takes it in
@@ -171,13 +186,13 @@ Result<void> WorkDesk::State::conclude(const WorkStatus& status, Job job) {
 
 Result<void> WorkDesk::State::look_after_waiting(const std::vector<WorkStatus>& all) {
   double longest_s = 0;
-  bool waits = false;
+  std::set<std::string> waiting;
   for (const auto& one : all) {
     if (one.state == WorkState::done || one.waiting_s <= 0) continue;
-    waits = true;
+    waiting.insert(one.kind);
     longest_s = std::max(longest_s, one.waiting_s);
   }
-  if (!waits) {
+  if (waiting.empty()) {
     raise({});
     return boost::outcome_v2::success();
   }
@@ -188,7 +203,9 @@ Result<void> WorkDesk::State::look_after_waiting(const std::vector<WorkStatus>& 
     });
   };
   if (deps.options.run_here) {
-    run_here(there(k_there_s) ? std::chrono::milliseconds(k_left_to_workers) : std::chrono::milliseconds(0));
+    const std::chrono::milliseconds left_alone{there(k_there_s) ? k_left_to_workers
+                                                                : std::chrono::seconds(0)};
+    for (const auto& kind : waiting) run_here(kind, left_alone);
     return boost::outcome_v2::success();
   }
   if (longest_s < k_alarm_s || there(k_alarm_s)) {
@@ -203,18 +220,24 @@ Result<void> WorkDesk::State::look_after_waiting(const std::vector<WorkStatus>& 
   return boost::outcome_v2::success();
 }
 
-void WorkDesk::State::run_here(std::chrono::milliseconds left_alone) {
+/// One of a kind at a time: a calibration never waits for a training run.
+void WorkDesk::State::run_here(const std::string& kind, std::chrono::milliseconds left_alone) {
   {
     auto n = now.lock();
-    if (n->busy || n->stopping) return;
-    n->busy = true;
+    if (n->stopping || !n->busy.insert(kind).second) return;
   }
-  strand->post([this, left_alone] {
-    (void)guarded("job",
-                  [&] { (void)runner.run_one(left_alone, [this] { return stopping(); }).has_value(); });
+  auto& strand = strands[kind];
+  if (!strand) strand = deps.on.strand();
+  strand->post([this, kind, left_alone] {
+    (void)guarded("job", [&] {
+      (void)runner
+          .run_one(
+              left_alone, [this] { return stopping(); }, kind)
+          .has_value();
+    });
     // Under the lock to its last line: who waits for it in stop() may take everything down right after.
     auto n = now.lock();
-    n->busy = false;
+    n->busy.erase(kind);
     n->look = true;
     changed.notify_all();
   });
@@ -235,7 +258,6 @@ Result<Job> WorkDesk::State::handed_out(Job job, std::string message) {
 }
 
 WorkDesk::WorkDesk(Deps deps) : state_(std::make_shared<State>(std::move(deps))) {
-  state_->strand = state_->deps.on.strand();
   state_->deps.jobs.cancel_elsewhere([s = state_.get()](const JobId& id) -> Result<bool> {
     auto there = s->deps.work.cancel(id);
     s->kick();
@@ -261,17 +283,22 @@ void WorkDesk::stop() {
   state_->changed.notify_all();
   if (state_->thread.joinable()) state_->thread.join();
   auto n = state_->now.lock();
-  n.wait(state_->changed, [](const State::Now& s) { return !s.busy; });
+  n.wait(state_->changed, [](const State::Now& s) { return s.busy.empty(); });
+}
+
+Result<void> WorkDesk::room_for(const std::string& kind) {
+  BOOST_OUTCOME_TRY(const auto all, state_->deps.work.all());
+  const auto waiting = std::ranges::count_if(
+      all, [&](const WorkStatus& w) { return w.kind == kind && w.state == WorkState::open; });
+  if (static_cast<std::size_t>(waiting) >= JobService::k_max_queued)
+    return make_error(Errc::queue_full, std::to_string(waiting) + " jobs are waiting already");
+  return boost::outcome_v2::success();
 }
 
 Result<Job> WorkDesk::submit(std::string kind, std::string request_json, std::string message,
                              const JobId& id) {
   auto& s = *state_;
-  BOOST_OUTCOME_TRY(const auto all, s.deps.work.all());
-  const auto waiting = std::ranges::count_if(
-      all, [&](const WorkStatus& w) { return w.kind == kind && w.state == WorkState::open; });
-  if (static_cast<std::size_t>(waiting) >= JobService::k_max_queued)
-    return make_error(Errc::queue_full, std::to_string(waiting) + " jobs are waiting already");
+  BOOST_OUTCOME_TRYV(room_for(kind));
   BOOST_OUTCOME_TRY(auto job, s.deps.jobs.submit_elsewhere(std::move(kind), std::move(request_json), id));
   return s.handed_out(std::move(job), std::move(message));
 }
@@ -285,6 +312,18 @@ Result<Job> WorkDesk::restart(const JobId& id, std::string message) {
   }
   BOOST_OUTCOME_TRY(auto job, s.deps.jobs.restart_elsewhere(id));
   return s.handed_out(std::move(job), std::move(message));
+}
+
+Result<void> WorkDesk::hand_over(Job job, std::string message) {
+  auto& s = *state_;
+  job.state = JobState::queued;
+  job.stage = "queued";
+  job.fraction = s.share(job.kind, 0);
+  job.attempts = 0;  // those of its work count
+  BOOST_OUTCOME_TRYV(s.deps.jobs.save(job));
+  BOOST_OUTCOME_TRYV(s.deps.work.offer({job.id, job.kind, s.deps.options.version, std::move(message)}));
+  s.kick();
+  return boost::outcome_v2::success();
 }
 
 std::vector<AlarmCondition> WorkDesk::alarms() const {
