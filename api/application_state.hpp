@@ -34,7 +34,6 @@
 #include "api/flight/routes.hpp"
 #include "api/kit/late_writer.hpp"
 #include "api/learning/routes.hpp"
-#include "api/work/work_desk.hpp"
 #include "api/measurements/demonstration.hpp"
 #include "api/measurements/device_ingest.hpp"
 #include "api/measurements/ingest.hpp"
@@ -53,6 +52,7 @@
 #include "api/stream/hub.hpp"
 #include "api/webhooks/routes.hpp"
 #include "api/webhooks/webhook_service.hpp"
+#include "api/work/work_desk.hpp"
 #include "core/base/guard.hpp"
 #include "core/base/locked.hpp"
 

@@ -18,7 +18,8 @@ bool is_covariance(const Eigen::Matrix3d& c) {
 }
 
 std::string fault_of(const Hypothesis& place) {
-  if (place.position.m.cwiseAbs().maxCoeff() > k_farthest_m) return "a position is more than a million km away";
+  if (place.position.m.cwiseAbs().maxCoeff() > k_farthest_m)
+    return "a position is more than a million km away";
   if (!is_covariance(place.covariance_m2)) return "a covariance is none";
   if (place.probability < 0 || place.probability > 1) return "a probability is not within 0 and 1";
   return {};
