@@ -16,7 +16,7 @@ using Json = nlohmann::json;
 using Ordered = nlohmann::ordered_json;
 
 constexpr std::string_view k_requests_per_minute = "requests_per_minute";
-constexpr std::size_t k_max_name = 200, k_max_description = 2000;
+constexpr std::size_t k_max_organization_name = 200, k_max_description = 2000;
 
 std::string etag(const Organization& organization) {
   return "\"o-" + std::to_string(organization.version) + '"';
@@ -40,7 +40,7 @@ Response answer(int status, const Organization& organization) {
 void patch_organization(const Json& body, bool whole, Organization& organization) {
   std::vector<FieldError> errors;
   Fields fields(body, "", errors);
-  if (auto name = fields.text("name", k_max_name, whole)) {
+  if (auto name = fields.text("name", k_max_organization_name, whole)) {
     if (name->empty()) fields.error("name", "required", "must not be empty");
     organization.name = *std::move(name);
   }

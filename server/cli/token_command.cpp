@@ -8,6 +8,7 @@
 #include "core/ports/site_store.hpp"
 #include "server/cli/commands.hpp"
 #include "server/cli/config_flags.hpp"
+#include "server/cli/failed.hpp"
 #include "server/cli/server_address.hpp"
 #include "server/http/http_client.hpp"
 #include "server/runtime/logging.hpp"
@@ -17,7 +18,7 @@
 namespace anchord::cli {
 namespace {
 
-struct Options {
+struct TokenOptions {
   std::string data_dir{"anchord-data"}, database, url, name, expires, id, organization;
   std::vector<std::string> roles, sites;
   std::optional<std::uint32_t> requests_per_minute;
@@ -40,26 +41,21 @@ Result<std::optional<UtcTime>> expiry(const std::string& text, UtcTime now) {
   return std::optional(time);
 }
 
-int fail(const std::string& message, int code = 1) {
-  std::fprintf(stderr, "anchord: %s\n", printable(message).c_str());
-  return code;
-}
-
 /// A running server owns the folder: ask it. Else open the folder ourselves.
-int through_server(const Options& options, const std::string& url, std::string_view method,
+int through_server(const TokenOptions& options, const std::string& url, std::string_view method,
                    const std::string& target, const std::string& body) {
   auto client = server::HttpClient::to(url);
-  if (!client) return fail(client.error().message, 2);
+  if (!client) return failed("anchord", client.error().message, 2);
   const std::string token = own_token(options.data_dir);
   if (!token.empty()) client.value().set_header("Authorization", "Bearer " + token);
   const auto answer = client.value().call(method, target, body);
-  if (!answer) return fail(answer.error().message);
-  if (answer.value().status >= 400) return fail(api::problem_text(answer.value().body));
+  if (!answer) return failed("anchord", answer.error().message);
+  if (answer.value().status >= 400) return failed("anchord", api::problem_text(answer.value().body));
   if (!answer.value().body.empty()) std::printf("%s\n", answer.value().body.c_str());
   return 0;
 }
 
-std::optional<std::string> server_of(const Options& options) {
+std::optional<std::string> server_of(const TokenOptions& options) {
   if (!options.url.empty()) return options.url;
   const auto url = running_server(options.data_dir);
   if (!url) return std::nullopt;
@@ -70,20 +66,21 @@ std::optional<std::string> server_of(const Options& options) {
 }
 
 template <class Act>
-int with_folder(const Options& options, Act act) {
+int with_folder(const TokenOptions& options, Act act) {
   StorageOptions storage;
   storage.data_dir = options.data_dir;
   const bool elsewhere = !options.database.empty() || !sql::postgres_of_folder(storage.data_dir).empty();
   if (!std::filesystem::exists(elsewhere ? storage.data_dir : storage.data_dir / "anchord.db"))
-    return fail(
+    return failed(
+        "anchord",
         "there is no anchord database in " + options.data_dir +
             ": give its folder with --data-dir; 'anchord serve' creates a new one, with a first token",
         2);
   auto database = open_store(options.database, storage);
-  if (!database) return fail(database.error().message);
+  if (!database) return failed("anchord", database.error().message);
   const SystemClock clock;
   api::AccessService access(database.value()->stores(), clock);
-  if (const auto loaded = access.load(); !loaded) return fail(loaded.error().message);
+  if (const auto loaded = access.load(); !loaded) return failed("anchord", loaded.error().message);
   return act(access, *database.value());
 }
 
@@ -102,7 +99,7 @@ Result<SiteSet> sites_of(const std::vector<std::string>& texts, SiteStore& known
 }
 
 /// Errors: invalid_argument where there is no such site or organization.
-Result<api::TokenBounds> bounds_of(const Options& options, const Stores& known) {
+Result<api::TokenBounds> bounds_of(const TokenOptions& options, const Stores& known) {
   api::TokenBounds out;
   BOOST_OUTCOME_TRY(out.sites, sites_of(options.sites, known.sites));
   out.requests_per_minute = options.requests_per_minute;
@@ -116,9 +113,9 @@ Result<api::TokenBounds> bounds_of(const Options& options, const Stores& known) 
   return out;
 }
 
-int create(const Options& options) {
+int create(const TokenOptions& options) {
   const auto expires = expiry(options.expires, SystemClock().now());
-  if (!expires) return fail(expires.error().message, 2);
+  if (!expires) return failed("anchord", expires.error().message, 2);
   if (const auto url = server_of(options)) {
     std::string roles;
     for (const auto& role : options.roles) roles += (roles.empty() ? "" : ",") + json_text(role);
@@ -135,17 +132,17 @@ int create(const Options& options) {
   return with_folder(options, [&](api::AccessService& access, Database& database) {
     const api::Principal who{"command line", "command line", {}};
     const auto bounds = bounds_of(options, database.stores());
-    if (!bounds) return fail(bounds.error().message, 2);
+    if (!bounds) return failed("anchord", bounds.error().message, 2);
     const auto made =
         access.create_token(options.name, options.roles, expires.value(), who, "local", bounds.value());
-    if (!made) return fail(made.error().message, 2);
+    if (!made) return failed("anchord", made.error().message, 2);
     std::fprintf(stderr, "token %s, shown once:\n", to_string(made.value().token.id).c_str());
     std::printf("%s\n", made.value().text.c_str());
     return 0;
   });
 }
 
-int list(const Options& options) {
+int list(const TokenOptions& options) {
   if (const auto url = server_of(options)) return through_server(options, *url, "GET", "/api/v1/tokens", {});
   return with_folder(options, [](api::AccessService& access, Database&) {
     for (const auto& token : access.tokens()) {
@@ -170,16 +167,16 @@ int list(const Options& options) {
   });
 }
 
-int revoke(const Options& options) {
+int revoke(const TokenOptions& options) {
   const auto id = parse_uuid(options.id);
-  if (!id) return fail(id.error().message, 2);
+  if (!id) return failed("anchord", id.error().message, 2);
   if (const auto url = server_of(options)) {
     return through_server(options, *url, "DELETE", "/api/v1/tokens/" + options.id, {});
   }
   return with_folder(options, [&](api::AccessService& access, Database&) {
     const api::Principal who{"command line", "command line", {}};
     const auto done = access.revoke_token(TokenId{id.value()}, who, "local");
-    return done ? 0 : fail(done.error().message);
+    return done ? 0 : failed("anchord", done.error().message);
   });
 }
 
@@ -188,7 +185,7 @@ int revoke(const Options& options) {
 void add_token_command(CLI::App& app, int& exit_code) {
   auto* command = app.add_subcommand("token", "Create, list and revoke access tokens");
   command->require_subcommand(1);
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<TokenOptions>();
   const auto common = [&](CLI::App* sub) {
     sub->add_option("--data-dir", options->data_dir, "folder of the database [anchord-data]")
         ->envname("ANCHORD_DATA_DIR");

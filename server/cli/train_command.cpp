@@ -65,7 +65,7 @@ Result<void> read_try(const std::string& text, ml::Grid& grid) {
   return boost::outcome_v2::success();
 }
 
-struct Gathered {
+struct GatheredTraining {
   ml::Dataset data;
   api::RowReport report;
   std::vector<std::string> held_out;  // a frozen data set's own test places
@@ -74,9 +74,9 @@ struct Gathered {
   std::string feature_set{nlos::k_feature_set_version};
 };
 
-Result<Gathered> gather_table(const TrainArguments& a, ml::Task task) {
+Result<GatheredTraining> gather_table(const TrainArguments& a, ml::Task task) {
   BOOST_OUTCOME_TRY(const auto table, read_data(a.data));
-  Gathered out;
+  GatheredTraining out;
   out.report = row_report(a.data, table);
   api::SetRequest request{
       a.features, task == ml::Task::nlos_id || task == ml::Task::los_bias || task == ml::Task::nlos_bias,
@@ -93,12 +93,12 @@ Result<Gathered> gather_table(const TrainArguments& a, ml::Task task) {
   return out;
 }
 
-Result<Gathered> gather(const TrainArguments& a, ml::Task task) {
+Result<GatheredTraining> gather(const TrainArguments& a, ml::Task task) {
   BOOST_OUTCOME_TRY(const auto frozen, read_frozen(a.data));
   if (frozen) {
     BOOST_OUTCOME_TRY(auto rows, rows_for(a.data, *frozen, task, a.features));
-    return Gathered{std::move(rows.data), std::move(rows.report), std::move(rows.held_out),
-                    rows.digest,          rows.not_for_live,      rows.feature_set};
+    return GatheredTraining{std::move(rows.data), std::move(rows.report), std::move(rows.held_out),
+                            rows.digest,          rows.not_for_live,      rows.feature_set};
   }
   BOOST_OUTCOME_TRY(auto out, gather_table(a, task));
   if (out.data.labelled() && (task == ml::Task::los_bias || task == ml::Task::nlos_bias)) {

@@ -18,13 +18,13 @@
 namespace anchord::cli {
 namespace {
 
-struct Options {
+struct WorkerOptions {
   server::DatabaseWorkerOptions worker;
   double lease_s{15};
   std::string log_level{"info"};
 };
 
-int run(Options& options) {
+int run_worker(WorkerOptions& options) {
   block_signals({SIGTERM, SIGINT});
   server::start_logging(options.log_level);
   static std::atomic<bool> stop{false};  // the thread below may outlive this call
@@ -55,7 +55,7 @@ void add_worker_command(CLI::App& app, int& exit_code) {
       "worker",
       "Run calibrations and training runs of a server on this machine: with --database of its PostgreSQL. "
       "Without --database this is the process that a server starts by itself");
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<WorkerOptions>();
   command
       ->add_option(
           "--database", options->worker.database,
@@ -71,7 +71,7 @@ void add_worker_command(CLI::App& app, int& exit_code) {
   command->add_option("--log-level", options->log_level, "debug, info, warning or error [info]")
       ->check(CLI::IsMember({"debug", "info", "warning", "error"}));
   command->callback([&exit_code, options] {
-    exit_code = options->worker.database.empty() ? server::worker_main() : run(*options);
+    exit_code = options->worker.database.empty() ? server::worker_main() : run_worker(*options);
   });
 }
 

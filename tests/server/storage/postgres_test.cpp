@@ -275,6 +275,51 @@ TEST_F(Postgres, RepeatsWorkThatAnotherWasInTheWayOf) {
   EXPECT_GT(here->status().repeats + there->status().repeats, 0u);
 }
 
+/// A mission of three ranges, the first with an impulse response, and a fix.
+constexpr const char* k_made_mission =
+    "INSERT INTO mission (mission_key, id, name, kit, radio, frame, track_point, state, created_t_ns) VALUES "
+    "(1, decode(repeat('01', 16), 'hex'), 'made', '', '', 0, 0, 0, 0); "
+    "INSERT INTO uwb_range (range_id, mission_key, kind, t_ns, tag, antenna, anchor, distance_m) "
+    "SELECT n, 1, 0, n, 1, 0, 2, 5 FROM generate_series(1, 3) AS n; "
+    "INSERT INTO cir (range_id, dt_ps, re_im) VALUES (1, 0, decode('00000000', 'hex')); "
+    "INSERT INTO fix (mission_key, t_ns, frame, fix_class) VALUES (1, 1, 0, 4)";
+constexpr const char* k_rows_of_missions =
+    "SELECT (SELECT count(*) FROM uwb_range) + (SELECT count(*) FROM cir) + (SELECT count(*) FROM fix)";
+
+TEST_F(Postgres, RowsGoWithTheirMission) {
+  ASSERT_TRUE(migrated());
+  const auto c = connect();
+  c->execute(k_made_mission);
+  ASSERT_EQ(integer(*c, k_rows_of_missions), 5);
+  c->execute("DELETE FROM mission");
+  EXPECT_EQ(integer(*c, k_rows_of_missions), 0);
+}
+
+// No foreign key is looked up with each row: transactions see that one of the two was in the way.
+TEST_F(Postgres, ARowIsNotStoredBesideTheDeletionOfItsMission) {
+  ASSERT_TRUE(migrated());
+  connect()->execute(k_made_mission);
+  const auto appends = gate(), removes = gate();
+  int tries = 0;
+  const auto error = appends->write(1, [&](Connection& c) -> std::optional<Error> {
+    if (integer(c, "SELECT mission_key FROM mission WHERE mission_key = 1") != 1)
+      return make_error(Errc::not_found, "the mission is gone");
+    if (++tries == 1) {
+      EXPECT_FALSE(removes->write(1, executes("DELETE FROM mission WHERE mission_key = 1")));
+    }
+    Query(c,
+          "INSERT INTO uwb_range (mission_key, kind, t_ns, tag, antenna, anchor, distance_m) VALUES (1, 0, "
+          "9, 1, 0, "
+          "2, 5)")
+        .run();
+    return std::nullopt;
+  });
+  ASSERT_TRUE(error);
+  EXPECT_EQ(error->code, Errc::not_found);
+  EXPECT_EQ(tries, 1);
+  EXPECT_EQ(integer(*connect(), k_rows_of_missions), 0);
+}
+
 TEST_F(Postgres, RefusesWhatIsMoreThanMayWait) {
   const auto g = gate({1, 1, 10, 1, std::chrono::seconds(30)});
   std::optional<Error> inner;

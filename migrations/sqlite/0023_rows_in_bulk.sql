@@ -1,0 +1,2 @@
+-- Of PostgreSQL alone: what a row of measurements costs there.
+SELECT 1;
