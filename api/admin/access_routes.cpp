@@ -4,6 +4,7 @@
 
 #include "api/admin/access.hpp"
 #include "api/kit/problem.hpp"
+#include "api/kit/reader.hpp"
 #include "api/kit/router.hpp"
 #include "api/kit/support.hpp"
 #include "core/base/to_wire.hpp"
@@ -200,8 +201,7 @@ Response create_token(AccessService& access, SiteStore& known, OrganizationStore
   bounds.sites = read_sites(body, known, faults);
   bounds.organization = read_organization(body, organizations, faults);
   bounds.requests_per_minute = read_requests(body, faults);
-  if (!faults.empty())
-    throw_problem(422, "validation", std::to_string(faults.size()) + " fields are wrong", faults);
+  refuse_if_any(faults);
   const auto made =
       value_or_problem(access.create_token(name, roles, expires, request.principal, request.remote, bounds));
   json out = token_json(made.token);

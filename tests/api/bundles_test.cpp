@@ -270,10 +270,11 @@ TEST_F(Bundles, LeaveOutACalibrationMadeWithAFlightThatIsNotHere) {
 
 TEST_F(Bundles, HaveEveryColumnThatIsNoKeyOfThisDatabase) {
   // A column that a migration adds must come along, or be named here with its reason.
-  const std::set<std::string> local{"mission_key",   "range_id",        "fix_id",
-                                    "exclusion_key", "calibration_key", "model_key",
-                                    "run_key",     // training runs stay where they ran
-                                    "signature"};  // what this server says of a model is its own word
+  const std::set<std::string> local{"mission_key",     "range_id",        "fix_id",
+                                    "exclusion_key",   "calibration_key", "model_key",
+                                    "run_key",          // training runs stay where they ran
+                                    "organization_id",  // whose site it is here, an administrator says
+                                    "signature"};       // what this server says of a model is its own word
   sqlite3* file = nullptr;
   ASSERT_EQ(sqlite3_open_v2((dir_ / "data" / "anchord.db").c_str(), &file, SQLITE_OPEN_READONLY, nullptr),
             SQLITE_OK);

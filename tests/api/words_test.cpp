@@ -248,6 +248,12 @@ std::set<std::string> words_without_a_table() {
           "System.mqtt.state", "FloorPlanGeoreference.source", "LiveEstimate.status"};
 }
 
+/// What is counted of a site is a part of what is counted of an organization.
+Json quota_words(std::size_t kinds) {
+  const Json all = words(k_quota_kind_words);
+  return Json(std::vector<Json>(all.begin(), all.begin() + static_cast<std::ptrdiff_t>(kinds)));
+}
+
 std::map<std::string, Json> tables_of_receivers() {
   return {
       {"WebhookRequest.events", Json(k_webhook_events)},    {"WebhookChange.events", Json(k_webhook_events)},
@@ -279,7 +285,8 @@ TEST(WireWords, AreThoseOfOpenApi) {
       {"FlightTime.against_forecast", words(flight::k_against_forecast_words)},
       {"AnchorGoal.source", words(k_goal_source_words)},
       {"POST /api/v1/missions/{id}/cir-archive.to", words(api::k_cirs_to_words)},
-      {"SiteQuota.reached", words(k_quota_kind_words)},
+      {"SiteQuota.reached", quota_words(k_quota_kinds)},
+      {"OrganizationQuota.reached", quota_words(k_organization_quota_kinds)},
       {"MissionAction.action", words({"finish", "take_devices"}, flight::k_flight_action_words)},
       {"MissionAction.mode", words(flight::k_flight_mode_words)},
       {"Procedure.mode", words(flight::k_flight_mode_words)},

@@ -110,7 +110,7 @@ TEST_F(StorageFailure, KeepsItsFilesFromOtherUsers) {
 }
 
 TEST_F(StorageFailure, AnswersStorageFullAtTheQuotaAndKeepsWhatItAcknowledged) {
-  options_.max_pages = 120;
+  options_.max_pages = 160;
   MissionId mission;
   int acknowledged = 0;
   {
@@ -159,7 +159,7 @@ TEST_F(StorageFailure, AnswersStorageFullWhenTheFileMayNotGrow) {
 
 TEST_F(StorageFailure, GivesUpItsReserveBeforeItAnswersFull) {
   options_.reserve_bytes = 1u << 20;
-  options_.max_pages = 120;
+  options_.max_pages = 160;
   const auto db = open();
   const auto reserve = options_.data_dir / "reserve.bin";
   EXPECT_EQ(std::filesystem::file_size(reserve), options_.reserve_bytes);
