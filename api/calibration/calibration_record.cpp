@@ -136,10 +136,10 @@ Json fuse_anchors(const ByAnchor& by_anchor, const std::optional<double>& base_s
 Json profiles_provenance(const CalibrationOrder& order, bool used) {
   Json out = Json::array();
   for (const auto& kit : order.kits) {
-    const bool told = used && kit.version;
+    const bool had_profile = used && kit.version;
     out.push_back({{"kit", kit.name},
-                   {"version", told && *kit.version > 0 ? Json(*kit.version) : Json(nullptr)},
-                   {"n_flights", told ? kit.n_flights : 0}});
+                   {"version", had_profile && *kit.version > 0 ? Json(*kit.version) : Json(nullptr)},
+                   {"n_flights", had_profile ? kit.n_flights : 0}});
   }
   return out;
 }

@@ -8,6 +8,7 @@
 #include "api/admin/event_log.hpp"
 #include "api/admin/secrets.hpp"
 #include "core/base/base64.hpp"
+#include "core/base/bytes.hpp"
 #include "core/base/check.hpp"
 #include "core/base/to_wire.hpp"
 
@@ -46,8 +47,8 @@ std::string webhook_signature(std::string_view secret, std::string_view id, std:
   const std::string text = std::string(id) + '.' + std::to_string(seconds) + '.' + std::string(body);
   unsigned char mac[EVP_MAX_MD_SIZE];
   unsigned int size = 0;
-  const auto* made = HMAC(EVP_sha256(), key->data(), static_cast<int>(key->size()),
-                          reinterpret_cast<const unsigned char*>(text.data()), text.size(), mac, &size);
+  const auto* made =
+      HMAC(EVP_sha256(), key->data(), static_cast<int>(key->size()), bytes_of(text), text.size(), mac, &size);
   ANCHORD_CHECK(made != nullptr, "HMAC-SHA256 is not available");
   return "v1," + base64({reinterpret_cast<const char*>(mac), size});
 }

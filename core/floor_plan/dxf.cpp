@@ -12,6 +12,8 @@
 #include <string>
 #include <string_view>
 
+#include "core/base/angle.hpp"
+
 namespace anchord::floor_plan {
 namespace {
 
@@ -21,7 +23,7 @@ using Eigen::Vector2d;
 constexpr std::string_view k_binary = "AutoCAD Binary DXF";
 constexpr int k_max_depth = 16;                   ///< of blocks in blocks
 constexpr std::size_t k_max_groups = 10'000'000;  ///< read, those of a block each time it is inserted
-constexpr double k_step_rad = 5 * std::numbers::pi / 180;
+constexpr double k_step_rad = 5 * k_degree;
 constexpr double k_largest = 1e10;  ///< coordinate in any unit
 
 std::string_view trimmed(std::string_view text) {
@@ -304,8 +306,7 @@ class Reader {
     } else if (e.type == "CIRCLE") {
       arc(place, center, Vector2d(e.value[40], 0), 1, 0, 2 * std::numbers::pi);
     } else if (e.type == "ARC") {
-      constexpr double k_rad = std::numbers::pi / 180;
-      arc(place, center, Vector2d(e.value[40], 0), 1, e.value[50] * k_rad, e.value[51] * k_rad);
+      arc(place, center, Vector2d(e.value[40], 0), 1, e.value[50] * k_degree, e.value[51] * k_degree);
     } else if (e.type == "ELLIPSE" && !e.fit_points.empty()) {
       arc(place, center, e.fit_points.front(), e.value[40], e.value[41], e.of(42, 2 * std::numbers::pi));
     } else if (e.type == "SPLINE") {
@@ -362,7 +363,7 @@ class Reader {
       return boost::outcome_v2::success();
     const auto columns = static_cast<int>(std::clamp(e.of(70, 1), 1.0, 1e4)),
                rows = static_cast<int>(std::clamp(e.of(71, 1), 1.0, 1e4));
-    const Eigen::Rotation2Dd turn(e.value[50] * std::numbers::pi / 180);
+    const Eigen::Rotation2Dd turn(e.value[50] * k_degree);
     Affine2d to_parent = inserted.place;
     if (e.backwards) to_parent = to_parent * Eigen::Scaling(-1.0, 1.0);
     for (int column = 0; column < columns; ++column) {

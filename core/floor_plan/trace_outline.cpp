@@ -5,6 +5,8 @@
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "core/base/cross.hpp"
+
 namespace anchord::floor_plan {
 namespace {
 
@@ -15,8 +17,6 @@ constexpr double k_same_line_m = 0.12;    ///< neighbours that differ by less ar
 constexpr double k_parallel_sine = 0.10;  ///< 6 degrees
 constexpr double k_least_area_m2 = 4;
 constexpr int k_shift = 4;  ///< sixteenths of a cell where shapes are drawn
-
-double cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) { return a.x() * b.y() - a.y() * b.x(); }
 
 cv::Mat as_mat(Mask& mask) { return cv::Mat(mask.rows, mask.columns, CV_8U, mask.ink.data()); }
 

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <utility>
 
+#include "core/base/cross.hpp"
+
 namespace anchord::floor_plan {
 namespace {
 
@@ -16,7 +18,6 @@ constexpr double k_joining_m = 1.0;
 constexpr double k_least_piece_m = 0.10;
 constexpr double k_corner_slack_m = 0.15;
 
-double cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) { return a.x() * b.y() - a.y() * b.x(); }
 Eigen::Vector2d perpendicular(const Eigen::Vector2d& v) { return {-v.y(), v.x()}; }
 
 using Interval = std::pair<double, double>;

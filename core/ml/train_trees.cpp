@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "core/ml/random.hpp"
+#include "core/ml/sigmoid.hpp"
 #include "core/ml/train.hpp"
 
 namespace anchord::ml {
@@ -230,7 +231,7 @@ Trees fit_boosted(const TrainingRows& rows, const BoostOptions& options, const E
   std::vector<std::uint32_t> order;
   for (int round = 0; round < options.rounds && !run.cancelled(); ++round) {
     for (std::size_t i = 0; i < n; ++i) {
-      const double p = options.classification ? 1 / (1 + std::exp(-f[i])) : 0;
+      const double p = options.classification ? sigmoid(f[i]) : 0;
       g[i] = rows.w[i] * (options.classification ? rows.y[i] - p : rows.y[i] - f[i]);
       h[i] = rows.w[i] * (options.classification ? std::max(p * (1 - p), 1e-9) : 1.0);
     }

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "core/planning/cross.hpp"
+#include "core/base/cross.hpp"
 
 namespace anchord::planning {
 namespace {

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <optional>
 
-#include "core/planning/cross.hpp"
+#include "core/base/cross.hpp"
 
 namespace anchord::planning {
 namespace {

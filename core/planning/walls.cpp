@@ -4,10 +4,10 @@
 #include <cmath>
 #include <optional>
 
+#include "core/base/cross.hpp"
+
 namespace anchord::planning {
 namespace {
-
-double cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) { return a.x() * b.y() - a.y() * b.x(); }
 
 /// Most walls of a house are.
 bool on_another_floor(const BuiltWall& wall, double low_m, double high_m) {

@@ -1,7 +1,8 @@
 #include "drivers/sim/wgs84.hpp"
 
 #include <cmath>
-#include <numbers>
+
+#include "core/base/angle.hpp"
 
 namespace anchord::sim {
 namespace {
@@ -10,10 +11,9 @@ namespace {
 constexpr double k_a_m = 6378137.0;
 constexpr double k_f = 1.0 / 298.257223563;
 constexpr double k_e2 = k_f * (2.0 - k_f);
-constexpr double k_rad = std::numbers::pi / 180.0;
 
 Eigen::Vector3d ecef_m(const Wgs84& at) {
-  const double lat = at.lat_deg * k_rad, lon = at.lon_deg * k_rad;
+  const double lat = at.lat_deg * k_degree, lon = at.lon_deg * k_degree;
   const double n = k_a_m / std::sqrt(1.0 - k_e2 * std::sin(lat) * std::sin(lat));
   return {(n + at.height_m) * std::cos(lat) * std::cos(lon),
           (n + at.height_m) * std::cos(lat) * std::sin(lon),
@@ -23,7 +23,7 @@ Eigen::Vector3d ecef_m(const Wgs84& at) {
 }  // namespace
 
 Wgs84 wgs84_from_enu(const Wgs84& origin, const Eigen::Vector3d& enu_m) {
-  const double lat0 = origin.lat_deg * k_rad, lon0 = origin.lon_deg * k_rad;
+  const double lat0 = origin.lat_deg * k_degree, lon0 = origin.lon_deg * k_degree;
   const Eigen::Vector3d east(-std::sin(lon0), std::cos(lon0), 0);
   const Eigen::Vector3d north(-std::sin(lat0) * std::cos(lon0), -std::sin(lat0) * std::sin(lon0),
                               std::cos(lat0));
@@ -37,7 +37,7 @@ Wgs84 wgs84_from_enu(const Wgs84& origin, const Eigen::Vector3d& enu_m) {
     lat = std::atan2(p.z() + k_e2 * n * std::sin(lat), rho_m);
   }
   const double height_m = rho_m * std::cos(lat) + p.z() * std::sin(lat) - k_a_m * k_a_m / n;
-  return {lat / k_rad, std::atan2(p.y(), p.x()) / k_rad, height_m};
+  return {lat / k_degree, std::atan2(p.y(), p.x()) / k_degree, height_m};
 }
 
 }  // namespace anchord::sim
