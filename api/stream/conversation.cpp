@@ -43,9 +43,12 @@ void Conversation::on_open(std::function<void()> wake) {
   Json topic_names = Json::array(), roles = Json::array();
   for (const auto& topic : topics()) topic_names.push_back(topic.name);
   for (const Role role : principal_.roles) roles.push_back(to_string(role));
-  nlohmann::ordered_json hello{{"op", "hello"},         {"server", hub_.server_name()},
-                               {"epoch", hub_.epoch()}, {"t_us", hub_.clock().now().us()},
-                               {"hb_ms", 1000},         {"topics", topic_names},
+  nlohmann::ordered_json hello{{"op", "hello"},
+                               {"server", hub_.server_name()},
+                               {"epoch", hub_.epoch()},
+                               {"t_us", hub_.clock().now().us()},
+                               {"hb_ms", k_heartbeat_us / 1000},
+                               {"topics", topic_names},
                                {"roles", roles}};
   send(to_wire(hello));
   membership_ = hub_.join(*this);

@@ -247,7 +247,7 @@ void Hub::tick() {
   }
   // A clock that was set back must not silence the heartbeat.
   const std::int64_t since_us = now.us() - bus->last_heartbeat_us;
-  const bool heartbeat = since_us >= 1'000'000 || since_us < 0;
+  const bool heartbeat = since_us >= k_heartbeat_us || since_us < 0;
   if (heartbeat) bus->last_heartbeat_us = now.us();
   for (auto* listener : bus->connections) listener->on_tick(now, heartbeat);
 }

@@ -57,6 +57,10 @@ const std::array<TopicInfo, k_topic_count>& topics();
 const TopicInfo& info(Topic topic);
 const TopicInfo* find_topic(std::string_view name);
 
+/// A page calls its link late when the newest heartbeat is two seconds old: on a slow link, where one waits
+/// for a part of a second behind what is larger, there must be time for the next.
+inline constexpr std::int64_t k_heartbeat_us = 500'000;
+
 /// One JSON object on its way to many clients; encoded once, shared by reference.
 struct LiveElement {
   std::string key;                    ///< of a state topic
@@ -168,7 +172,7 @@ class Hub {
   /// How many may come is decided where connections are accepted (ws.max_connections), not here.
   [[nodiscard]] HubMembership join(HubListener& listener);
 
-  /// Every 50 ms: sends what was collected; wakes clients with due frames; a heartbeat each second.
+  /// Every 50 ms: sends what was collected; wakes clients with due frames; a heartbeat twice a second.
   void tick();
   /// Tells every client to go (4010).
   void shut_down();

@@ -116,7 +116,8 @@ int worker_main() {
   const pid_t server = getppid();
   settle_in(server);
   std::string message;
-  if (read_frame(k_socket, message, -1) != FrameRead::frame) {
+  FrameReader from_server(k_socket);
+  if (from_server.read(message, -1) != FrameRead::frame) {
     std::fputs("anchord worker: without --database this is the process that a server starts by itself\n",
                stderr);
     return 2;
@@ -130,10 +131,10 @@ int worker_main() {
     if (behind != nullptr && !write_frame(k_socket, *behind)) _exit(1);
   };
   // Hears the server while the work goes on: a word to stop, or its end.
-  Thread listener("listener", [&stop] {
+  Thread listener("listener", [&stop, &from_server] {
     std::string text;
     while (true) {
-      const auto read = read_frame(k_socket, text, -1);
+      const auto read = from_server.read(text, -1);
       if (read == FrameRead::closed) _exit(1);
       if (read == FrameRead::frame) stop.request_stop();
     }

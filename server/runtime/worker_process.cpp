@@ -141,20 +141,25 @@ Result<std::string> run(const std::filesystem::path& program, const std::string&
   BOOST_OUTCOME_TRY(const auto pid, spawn(program, theirs.fd()));
   Child child(pid, message);
   theirs.close();
-  if (!write_frame(ours.fd(), message)) return child.end(" before it began");
+  FrameReader answers(ours.fd());
+  bool gave_up = false;
+  if (!write_frame(ours.fd(), message, [&] { return gave_up = canceled(); })) {
+    if (gave_up) return make_error(Errc::canceled, "canceled");
+    return child.end(" before it began");
+  }
   std::optional<Steady::time_point> asked_to_stop;
   std::string text;
   bool done = false;  // the next frame is the result
   while (true) {
     if (!asked_to_stop && canceled()) {
       asked_to_stop = Steady::now();
-      (void)write_frame(ours.fd(), R"({"op":"cancel"})");
+      (void)write_frame(ours.fd(), R"({"op":"cancel"})", [] { return true; });  // who takes nothing is killed
     }
     if (asked_to_stop && Steady::now() - *asked_to_stop > k_grace) {
       child.kill();
       return make_error(Errc::canceled, "canceled");
     }
-    switch (read_frame(ours.fd(), text, 50)) {
+    switch (answers.read(text, 50)) {
       case FrameRead::nothing:
         continue;
       case FrameRead::closed:

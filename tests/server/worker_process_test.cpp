@@ -32,11 +32,18 @@ class WorkerProcess : public testing::Test {
   }
   void TearDown() override { std::filesystem::remove_all(dir_); }
 
-  Result<std::string> run(const std::string& script, const std::string& message) const {
+  Result<std::string> run(
+      const std::string& script, const std::string& message,
+      const std::function<bool()>& canceled = [] { return false; }) const {
     const auto program = dir_ / "program";
     std::ofstream{program} << "#!/bin/sh\n" << script << '\n';
     ::chmod(program.c_str(), 0755);
-    return work_in_process(program)(message, {}, [] { return false; });
+    return work_in_process(program)(message, {}, canceled);
+  }
+  /// Asked five times, the caller wants it no more. The script outlives every test that waits for it.
+  Result<std::string> canceled_while(const std::string& script, const std::string& message) const {
+    int n_asked = 0;
+    return run(script + "; exec sleep 600", message, [&n_asked] { return ++n_asked > 5; });
   }
   /// The worker sends one frame, 4 bytes of length and a text, over the socket that is its input.
   Result<std::string> says(const std::string& text) const {
@@ -72,6 +79,29 @@ TEST_F(WorkerProcess, AKilledWorkerIsToldAsAlmostCertainlyOutOfMemory) {
   EXPECT_NE(result.error().message.find("was ended by signal 9"), std::string::npos)
       << result.error().message;
   EXPECT_NE(result.error().message.find("no memory left"), std::string::npos) << result.error().message;
+}
+
+TEST_F(WorkerProcess, IsCanceledThoughItNeverReadsItsMessage) {
+  const auto result = canceled_while(":", std::string(8 << 20, 'x'));
+  ASSERT_FALSE(result);
+  EXPECT_EQ(result.error().code, Errc::canceled);
+}
+
+TEST_F(WorkerProcess, IsCanceledThoughItStandsStillInTheMiddleOfAnAnswer) {
+  for (const char* part : {"\\144\\000", "\\144\\000\\000\\000{", "\\144\\000\\000\\000{\"op\":"}) {
+    const auto result = canceled_while("printf '" + std::string(part) + "' >&0", "{}");
+    ASSERT_FALSE(result) << part;
+    EXPECT_EQ(result.error().code, Errc::canceled) << part;
+  }
+}
+
+TEST_F(WorkerProcess, ReadsAnAnswerThatComesInPieces) {
+  const auto result =
+      run("printf '\\015\\000' >&0; sleep 0.2; printf '\\000\\000{\"op\":\"d' >&0; sleep 0.2; "
+          "printf 'one\"}\\004\\000\\000\\000go' >&0; sleep 0.2; printf 'od' >&0; sleep 1",
+          "{}");
+  ASSERT_TRUE(result) << result.error().message;
+  EXPECT_EQ(result.value(), "good");
 }
 
 TEST_F(WorkerProcess, ACrashedWorkerSaysThatTheRunIsKeptAndWhatToTry) {

@@ -91,7 +91,14 @@ describe('the player of a recording', () => {
     const p = new Player(recording);
     p.to(10.5e6, 1000);
     p.to(10.5e6, 9000);
-    expect(9000 - p.scene.pose!.at_ms).toBeCloseTo(500, 6);
+    const at_ms = [p.scene.pose!.at_ms, p.scene.rtk!.at_ms, p.scene.range_at_ms, p.scene.ranges.get('0x2')!.at_ms];
+    for (const t of at_ms) expect(9000 - t).toBeCloseTo(500, 6);
+  });
+  it('reaches from the first moment over all that is flown', () => {
+    const { reach_m } = new Player(recording);
+    expect([...new Set(reach_m.map(([e]) => e))]).toEqual([0, 599]);
+    expect([...new Set(reach_m.map(([, , u]) => u))]).toEqual([5]);
+    expect(new Player({ ...recording, poses: [] }).reach_m).toEqual([]);
   });
   it('shows the estimates of the moment, with all that led to them, and none of later ones', () => {
     const p = new Player(recording),

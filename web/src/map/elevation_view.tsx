@@ -166,13 +166,14 @@ function words(content: Content, picture: Picture | null, above: string): string
 function arranged(content: Content, bearing_deg: number, w: number, h: number): Picture | null {
   if (w < 40 || h < 40) return null;
   const s = (m: readonly [number, number] | readonly [number, number, number]): number => along(bearing_deg, m),
-    { flight, scene } = content,
+    { flight, scene, reach_m = [] } = content,
     heights = flight?.heights ?? null,
     ground_m = heights?.ground_m ?? null,
     zero = ground_m ?? 0,
     flown: [number, number][] = (scene?.trail ?? []).map((q) => [s([q.e, q.n]), q.u]),
     pose = scene?.pose?.value.enu_m;
   if (pose) flown.push([s(pose), pose[2]]);
+  for (const q of reach_m) flown.push([s(q), q[2]]);
   const planned: [number, number][] = heights
     ? [
         ...(flight?.outline ?? []).flatMap((q): [number, number][] => [

@@ -139,7 +139,7 @@ export function open_map(
 
   /// Everything known, in metres; null while nothing is.
   const extent = (): [number, number, number, number] | null => {
-    const { anchors, scene, flight } = hooks.content();
+    const { anchors, scene, flight, reach_m = [] } = hooks.content();
     const box: [number, number, number, number] = [Infinity, Infinity, -Infinity, -Infinity];
     const add = (e: number, n: number): void => {
       box[0] = Math.min(box[0], e);
@@ -149,11 +149,12 @@ export function open_map(
     };
     const trail = scene?.trail ?? [];
     for (const q of trail) add(q.e, q.n);
+    for (const q of reach_m) add(q[0], q[1]);
     const d = scene?.pose?.value.enu_m;
     if (d) add(d[0], d[1]);
     // An estimate that is still far off (hundreds of metres at first) must not shrink the flight to a dot.
     const span = Math.max(60, 2 * Math.hypot(box[2] - box[0], box[3] - box[1]) || 0),
-      flown = trail.length > 0 || !!d;
+      flown = trail.length + reach_m.length > 0 || !!d;
     // What is to be flown belongs to the picture, unless it is a plan of another place.
     for (const q of flight ? [...flight.outline, ...flight.waypoints] : [])
       if (!flown || Math.hypot(q[0] - (box[0] + box[2]) / 2, q[1] - (box[1] + box[3]) / 2) < span + PLAN_NEAR_M)

@@ -30,6 +30,7 @@ export interface Content {
   readonly running: boolean; ///< the flight is being recorded
   readonly flight?: FlightPicture | null; ///< what is to be flown, where something is
   readonly backdrops?: readonly Backdrop[]; ///< plans of floors, under everything
+  readonly reach_m?: readonly Vec3[]; ///< of a stored flight: corners of all that was flown, whatever the moment
 }
 
 const RANGE_STALE_MS = 2000,

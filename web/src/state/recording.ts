@@ -17,6 +17,7 @@ import {
   type Pose,
   type RangeMsg,
   type Unchecked,
+  type Vec3,
 } from '../live/messages';
 import { grid, height, procedure, turn } from '../live/flight_messages';
 import type { Topic } from '../live/stream';
@@ -278,6 +279,20 @@ export function neighbour<T extends Timed>(marks: readonly T[], t_us: number, by
   return null;
 }
 
+/// The corners of the box that holds the track; none where no place is known.
+export function reach_of(poses: readonly Pick<Pose, 'enu_m'>[]): Vec3[] {
+  const low = [Infinity, Infinity, Infinity],
+    high = [-Infinity, -Infinity, -Infinity];
+  for (const { enu_m } of poses)
+    enu_m?.forEach((v, i) => {
+      low[i] = Math.min(low[i]!, v);
+      high[i] = Math.max(high[i]!, v);
+    });
+  if (low[0] === Infinity) return [];
+  const [es, ns, us] = [0, 1, 2].map((i) => [low[i]!, high[i]!]) as [number[], number[], number[]];
+  return es.flatMap((e) => ns.flatMap((n) => us.map((u): Vec3 => [e, n, u])));
+}
+
 const BEFORE_US = 120_000_000; ///< what a jump shows of the past: the trail of the live view
 export class Player {
   scene: Scene;
@@ -290,7 +305,11 @@ export class Player {
   private procedure: readonly Shown[] = [];
   private shown = 0;
 
+  /// What the map fits, so that it stands still while the flight is played, and shows where it was flown from the start.
+  readonly reach_m: readonly Vec3[];
+
   constructor(readonly recording: Recording) {
+    this.reach_m = reach_of(recording.poses);
     this.scene = new Scene(recording.mission.mission);
     this.t_us = recording.from_us;
   }
@@ -352,10 +371,14 @@ export class Player {
   /// While it stands still, what was fresh at that moment stays fresh.
   private freshen(at_us: number, now_ms: number): void {
     const age_ms = (t: number): number => now_ms - Math.max(0, (at_us - t) / 1000),
-      { pose, procedure } = this.scene;
+      { pose, rtk, procedure } = this.scene;
     if (procedure) this.scene.procedure = { value: procedure.value, at_ms: age_ms(procedure.value.t_us) };
     if (pose) this.scene.pose = { value: pose.value, at_ms: age_ms(pose.value.t_us) };
-    for (const row of this.scene.ranges.values()) row.at_ms = age_ms(row.last.t_us);
+    if (rtk) this.scene.rtk = { value: rtk.value, at_ms: age_ms(rtk.value.t_us) };
+    for (const row of this.scene.ranges.values()) {
+      row.at_ms = age_ms(row.last.t_us);
+      this.scene.range_at_ms = Math.max(this.scene.range_at_ms, row.at_ms);
+    }
     for (const [id, e] of this.scene.anchors)
       this.scene.anchors.set(id, { value: e.value, at_ms: age_ms(e.value.t_us) });
   }

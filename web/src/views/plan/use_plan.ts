@@ -1,5 +1,5 @@
 /// One open plan: its drawing with undo, what is saved of it, the check of it, and the requests that change it. No DOM but the title.
-import { useEffect, useLayoutEffect, useState } from 'preact/hooks';
+import { useEffect, useLayoutEffect, useRef, useState } from 'preact/hooks';
 import { published, type AnchorRow } from '../../api/anchors';
 import { ApiError, error_text } from '../../api/client';
 import {
@@ -102,11 +102,15 @@ export function usePlan(id: string | null) {
     }
     set_busy('');
   };
+  const questions = useRef(0);
   const begin = useStable((): void => {
     document.title = 'Plan - anchord';
     set_ready(false);
+    // Asked again, as when the link came back meanwhile, only the last answer counts: an earlier one must not take away what was drawn since.
+    const question = ++questions.current;
     fetch_plans().then(
       (list) => {
+        if (question !== questions.current) return;
         set_all(list);
         const last = id ? null : newest_draft('plan/')?.key,
           wanted =
@@ -118,7 +122,9 @@ export function usePlan(id: string | null) {
         set_problem('');
         set_ready(true);
       },
-      (e: unknown) => set_problem(error_text(e)),
+      (e: unknown) => {
+        if (question === questions.current) set_problem(error_text(e));
+      },
     );
   });
   useEffect(begin, [id, begin]);

@@ -245,6 +245,7 @@ export function Replay({ id }: { id: string | null }) {
             running: true,
             flight: player && flown_picture(player.recording, player.t_us, player.scene),
             backdrops: backdrops(mission.origin),
+            reach_m: player?.reach_m ?? [],
           })}
           onSelect={(a) => (chosen_anchor.value = a)}
           label="Map of the recorded flight"
