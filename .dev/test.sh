@@ -36,7 +36,7 @@ run_tests() {
   local folder=$1 ; shift
   local log=$folder/test.log junit=$folder/junit.xml second=$folder/junit-alone.xml status=0 jobs alone
   jobs=$(jobs_count)
-  ((jobs += 1))  # half of what the tests do is to wait, for aircraft, pages and leases that live in real time
+  ((jobs *= 2))  # tests that compute take two (tests/CMakeLists.txt); the others wait, for aircraft, pages and leases that live in real time
   rm -f "$junit" "$second"
   say "testing"
   ${fixed[@]+"${fixed[@]}"} ctest --test-dir "$folder" --output-on-failure --no-tests=error -j "$jobs" \
@@ -77,11 +77,11 @@ verdicts() {
 }
 
 # to_run_alone JUNIT: names as a regular expression. Tests work in real time with ports, disks, a browser, an aircraft, beside another test
-# on the other core: one to three that failed are run once more, alone. More than three stand.
+# on the other core: one to six that failed are run once more, alone. More than six stand.
 to_run_alone() {
   verdicts "$1" | awk '
     $1 == "failed" { name = $2; gsub(/[^A-Za-z0-9_\/-]/, ".", name); names = names (failed++ ? "|" : "") name }
-    END { if (failed >= 1 && failed <= 3) print names }'
+    END { if (failed >= 1 && failed <= 6) print names }'
 }
 
 # summarize JUNIT [JUNIT OF THOSE RUN ALONE]: names what did not just pass, then the counts. What passed only alone is named too: it is

@@ -137,6 +137,22 @@ test('a simulated flight converges on screen, and what is published is what the 
   }
   await id('theme').click();
 
+  // Nothing moves any more: a page that is left open does not use up the tablet's battery.
+  const pictures = await page.evaluate(async () => {
+    const ask = globalThis.requestAnimationFrame;
+    let n = 0;
+    globalThis.requestAnimationFrame = (draw) => {
+      n++;
+      return ask(draw);
+    };
+    await new Promise((done) => setTimeout(done, 2000)); // the last pose is of more than 1.5 s ago
+    n = 0;
+    await new Promise((done) => setTimeout(done, 3000));
+    globalThis.requestAnimationFrame = ask;
+    return n;
+  });
+  assert.ok(pictures > 0 && pictures < 60, `${pictures} pictures in 3 s`);
+
   await page.keyboard.press('3');
   await id('anchor-table').waitFor();
   const rows = await id('anchor-table').locator('tbody tr').count();

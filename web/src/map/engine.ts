@@ -8,7 +8,7 @@ import { to_px, type Camera } from './camera';
 import { magnification } from './enu';
 import { read_palette, type Palette } from './palette';
 import { next_picture } from '../state/pace';
-import { interpolated } from '../state/scene';
+import { interpolated, ms_a_pixel } from '../state/scene';
 import type { Box } from './symbols';
 import { draw_fast, draw_slow, draw_top, mark_trail, trail_stands, type Content, type TrailMark } from './picture';
 
@@ -30,6 +30,11 @@ export interface MapHooks {
 // Metres of a site: no projection on the globe, so ellipses are ellipses and doubles go all the way.
 const ENU = new Projection({ code: 'anchord:enu', units: 'm', extent: [-2e5, -2e5, 2e5, 2e5] });
 const PLAN_NEAR_M = 300;
+// Between two pictures while the drone moves by less than a pixel, and while nothing comes of it: the battery is an operator's too.
+const PICTURE_MS = 1000 / 60,
+  STANDS_MS = 50,
+  QUIET_MS = 95;
+const screen_ratio = (): number => Math.min(2, devicePixelRatio || 1);
 const reduced = matchMedia('(prefers-reduced-motion: reduce)');
 
 /// Where buttons and scales lie over the map: no name is written under them.
@@ -71,7 +76,7 @@ export function open_map(
     return { e: e!, n: n!, px_per_m: 1 / (view.getResolution() ?? 1), w: w!, h: h! };
   };
   const sized = (canvas: HTMLCanvasElement, cam: Camera): CanvasRenderingContext2D | null => {
-    const ratio = Math.min(2, devicePixelRatio || 1),
+    const ratio = screen_ratio(),
       [w, h] = [Math.round(cam.w * ratio), Math.round(cam.h * ratio)];
     if (canvas.width !== w || canvas.height !== h) {
       canvas.width = w;
@@ -98,6 +103,7 @@ export function open_map(
       if (t) draw_top(t, palette, cam, content, covered(target));
       hooks.camera_changed(cam.px_per_m, magnified);
       dirty = true;
+      at_once();
       return slow;
     },
   });
@@ -210,21 +216,39 @@ export function open_map(
     drawn = -1,
     last_ms = 0,
     aimed_ms = 0,
-    place = '';
+    place = '',
+    resting: ReturnType<typeof setTimeout> | null = null;
+  const rest = (ms: number): void => {
+    if (ms < 1.5 * PICTURE_MS) next_picture(frame);
+    else
+      resting = setTimeout(() => {
+        resting = null;
+        next_picture(frame);
+      }, ms - PICTURE_MS);
+  };
+  const at_once = (): void => {
+    if (resting === null) return;
+    clearTimeout(resting);
+    resting = null;
+    next_picture(frame);
+  };
   const frame = (t: number): void => {
     if (closed) return;
-    next_picture(frame);
+    const content = hooks.content(),
+      scene = content.scene,
+      flies = scene?.pose && t - scene.pose.at_ms < 1500 ? scene : null;
+    rest(flies ? Math.min(STANDS_MS, ms_a_pixel(flies, camera().px_per_m * screen_ratio())) : QUIET_MS);
     if (t - aimed_ms > 300) {
       aimed_ms = t;
       aim();
     }
-    const content = hooks.content(),
-      scene = content.scene,
-      cam = camera(),
+    const cam = camera(),
       now = performance.now(),
-      at = scene?.pose && t - scene.pose.at_ms < 1500 ? interpolated(scene, now) : null,
-      // Half a pixel and two degrees: less than that nobody sees.
-      here = at ? [...to_px(cam, at.body).map((x) => x * 2), (at.heading_deg ?? 0) / 2].map(Math.round).join() : '';
+      at = flies && interpolated(flies, now),
+      // A pixel of the screen and two degrees: less than that nobody sees.
+      here = at
+        ? [...to_px(cam, at.body).map((x) => x * screen_ratio()), (at.heading_deg ?? 0) / 2].map(Math.round).join()
+        : '';
     // What is new beside it, ten times a second; while nothing comes, four times, for ages and fading.
     const moved = dirty || here !== place,
       news = scene?.version !== drawn && t - last_ms > 95;
@@ -242,6 +266,7 @@ export function open_map(
     map.updateSize();
     fitted = null;
     dirty = true;
+    at_once();
     if (mode === 'fit') fit(false);
   });
   resized.observe(target);
@@ -273,6 +298,7 @@ export function open_map(
     },
     close: () => {
       closed = true;
+      if (resting !== null) clearTimeout(resting);
       resized.disconnect();
       map.setTarget(undefined);
       map.dispose();
