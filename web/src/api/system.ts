@@ -2,7 +2,7 @@
 import { drone, type DroneMsg } from '../live/flight_messages';
 import type { Topic } from '../live/stream';
 import { idempotency_key } from './client';
-import { call, get, list, of_program, type Wire } from './contract';
+import { call, get, given, list, of_program, type Wire } from './contract';
 
 export type Token = Wire<'Token'>;
 export type AuditLine = Wire<'Audit'>;
@@ -17,10 +17,11 @@ export const ROLES = ['viewer', 'integrator', 'gateway', 'engineer', 'operator',
 export type Role = (typeof ROLES)[number];
 
 export const tokens = (): Promise<Token[]> => list('/tokens');
-/// The secret is in this answer and nowhere else.
-export async function create_token(name: string, role: Role): Promise<string> {
-  const headers = { 'Idempotency-Key': idempotency_key() };
-  return (await call('post', '/tokens', { body: { name, roles: [role] }, headers })).body.token ?? '';
+/// The secret is in this answer and nowhere else. organization: the only sites it sees; null: every site.
+export async function create_token(name: string, role: Role, organization: string | null): Promise<string> {
+  const headers = { 'Idempotency-Key': idempotency_key() },
+    body = { name, roles: [role], ...given<{ organization?: string }>({ organization }) };
+  return (await call('post', '/tokens', { body, headers })).body.token ?? '';
 }
 export const revoke_token = (id: string): Promise<unknown> => call('delete', '/tokens/{id}', { path: { id } });
 export const audit = (): Promise<AuditLine[]> => list('/audit', { query: { limit: 100 } });

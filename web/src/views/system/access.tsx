@@ -11,6 +11,7 @@ import {
   type AuditLine,
   type Token,
 } from '../../api/system';
+import { organizations, read_organizations } from '../../state/organizations';
 import { say } from '../../state/store';
 import { Empty, useLoad } from '../../ui/empty';
 import { CopyBox } from '../../ui/copy_box';
@@ -31,6 +32,7 @@ export function AccessPanel() {
     [problem, set_problem] = useState(''),
     [name, set_name] = useState(''),
     [role, set_role] = useState<Role>('viewer'),
+    [firm, set_firm] = useState(''),
     [secret, set_secret] = useState(''),
     [sure, set_sure] = useState('');
   const load = (): void => {
@@ -43,6 +45,7 @@ export function AccessPanel() {
     );
   };
   useLoad(load);
+  useLoad(() => void read_organizations().catch(() => undefined));
   const guarded = async (work: () => Promise<void>): Promise<void> => {
     set_problem('');
     try {
@@ -54,8 +57,9 @@ export function AccessPanel() {
   };
   const create = (): void =>
     void guarded(async () => {
-      set_secret(await create_token(name.trim(), role));
+      set_secret(await create_token(name.trim(), role, firm || null));
       set_name('');
+      set_firm('');
     });
   /// Two presses: a revoked token cannot be brought back.
   const revoke = (t: Token): void => {
@@ -99,6 +103,17 @@ export function AccessPanel() {
             ))}
           </select>
         </label>
+        <label>
+          <span class="lab">Sites</span>
+          <select value={firm} data-testid="token-organization" onChange={(e) => set_firm(e.currentTarget.value)}>
+            <option value="">every site</option>
+            {(organizations.value ?? []).map((o) => (
+              <option key={o.id} value={o.id}>
+                those of {o.name}
+              </option>
+            ))}
+          </select>
+        </label>
         <span class="actions">
           <button class="btn primary" data-testid="create-token" disabled={!name.trim()}>
             Make a token
@@ -136,7 +151,14 @@ export function AccessPanel() {
                 <span class="mut block">made {date(t.created_at)}</span>
               </th>
               <td>{t.roles.join(', ')}</td>
-              <td>{t.sites ? grouped(t.sites.length) : <span class="mut">every site</span>}</td>
+              <td>
+                {t.sites ? grouped(t.sites.length) : <span class="mut">every site</span>}
+                {t.organization && (
+                  <span class="mut block">
+                    of {organizations.value?.find((o) => o.id === t.organization)?.name ?? 'an organization'}
+                  </span>
+                )}
+              </td>
               <td>{t.last_used_at ? date(t.last_used_at) : <span class="mut">never</span>}</td>
               <td>{t.expires_at ? date(t.expires_at) : <span class="mut">never</span>}</td>
               <td class="acts">

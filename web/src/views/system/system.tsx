@@ -13,6 +13,7 @@ import { BasePanel } from './base';
 import { DevicesPanel } from './devices';
 import { LeverPanel } from './levers';
 import { FlightsPanel } from './flights';
+import { OrganizationsPanel } from './organizations';
 import { TimePanel } from './time';
 
 /// `part` connect: the first set-up, step by step.
@@ -35,6 +36,7 @@ export function System({ part }: { part: string | null }) {
       <FlightsPanel />
       <HealthPanel />
       {of_every_site.value && may('admin') && <AccessPanel />}
+      {of_every_site.value && may('admin') && <OrganizationsPanel />}
       {of_every_site.value && may('admin') && <AuditPanel />}
     </div>
   );
