@@ -1,7 +1,7 @@
 import { describe, expect, it } from 'vitest';
 import { estimate, pose, range, type RangeMsg } from '../src/live/messages';
 import { trail_of } from '../src/state/archive';
-import { interpolated, ms_a_pixel, range_class, rate_hz, Scene } from '../src/state/scene';
+import { interpolated, range_class, rate_hz, Scene } from '../src/state/scene';
 
 const at = (t_s: number, e: number, extra: object = {}) =>
   pose({ mission: 'm', t_us: t_s * 1e6, enu_m: [e, 0, 5], fix: 'fixed', heading_deg: 350, ...extra })!;
@@ -33,19 +33,6 @@ describe('Scene', () => {
     s.add_range(heard(2, 5), 0);
     s.add_range(heard(1, 9), 1);
     expect(s.ranges.get('0x1')!.last.distance_m).toBe(5);
-  });
-  it('knows how long the drone takes to move by a pixel, or to turn by what one sees', () => {
-    const s = new Scene('m');
-    expect(ms_a_pixel(s, 10)).toBe(Infinity);
-    s.add_pose(at(0, 0), 0);
-    expect(ms_a_pixel(s, 10)).toBe(Infinity);
-    s.add_pose(at(0.1, 0.2), 100); // 2 m/s
-    expect(ms_a_pixel(s, 10)).toBeCloseTo(50, 6);
-    expect(ms_a_pixel(s, 40)).toBeCloseTo(12.5, 6);
-    s.add_pose(at(0.2, 0.2), 200);
-    expect(ms_a_pixel(s, 10)).toBe(Infinity);
-    s.add_pose(at(0.3, 0.2, { heading_deg: 10 }), 300); // by 20 degrees, through north
-    expect(ms_a_pixel(s, 10)).toBeCloseTo(10, 6);
   });
   it('moves the drone evenly between two poses and through north the short way', () => {
     const s = new Scene('m');

@@ -6,9 +6,10 @@ import Projection from 'ol/proj/Projection.js';
 import View from 'ol/View.js';
 import { to_px, type Camera } from './camera';
 import { magnification } from './enu';
+import { ms_a_pixel } from './motion';
 import { read_palette, type Palette } from './palette';
 import { next_picture } from '../state/pace';
-import { interpolated, ms_a_pixel } from '../state/scene';
+import { interpolated } from '../state/scene';
 import type { Box } from './symbols';
 import { draw_fast, draw_slow, draw_top, mark_trail, trail_stands, type Content, type TrailMark } from './picture';
 

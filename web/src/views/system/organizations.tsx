@@ -114,7 +114,7 @@ function Detail({ of, changed, removed }: { of: Organization; changed: () => voi
     );
   };
   useLoad(load);
-  const act = async (work: () => Promise<unknown>, words: string): Promise<boolean> => {
+  const act = async (work: () => Promise<unknown>, words: string, then = load): Promise<boolean> => {
     set_problem('');
     try {
       await work();
@@ -123,7 +123,7 @@ function Detail({ of, changed, removed }: { of: Organization; changed: () => voi
       return false;
     }
     say(words);
-    load();
+    then();
     return true;
   };
   if (!quota || !sites)
@@ -162,11 +162,10 @@ function Detail({ of, changed, removed }: { of: Organization; changed: () => voi
               title={own.length > 0 ? 'It has sites: take them out first' : undefined}
               onClick={() => {
                 if (!sure) set_sure(true);
-                else
-                  void act(() => remove_organization(of.id), `${of.name} removed`).then((done) => {
-                    set_sure(false);
-                    if (done) removed();
-                  });
+                else {
+                  set_sure(false);
+                  void act(() => remove_organization(of.id), `${of.name} removed`, removed);
+                }
               }}
             >
               {sure ? 'Press again to remove' : 'Remove'}
