@@ -1,7 +1,7 @@
 /// What every dialog owes the keyboard: it has the focus when it opens, Escape closes it (of several the newest), and the focus goes back to where
 /// it came from. Its role comes from here too, so that none is made without the rest.
 import type { RefObject } from 'preact';
-import { useEffect, useRef } from 'preact/hooks';
+import { useLayoutEffect, useRef } from 'preact/hooks';
 import { useStable } from './use_stable';
 
 export interface Dialog<T extends HTMLElement> {
@@ -44,7 +44,8 @@ function give_back(opener: HTMLElement | null): void {
 export function useDialog<T extends HTMLElement>(close: () => void, help: string, open = true): Dialog<T> {
   const ref = useRef<T>(null),
     end = useStable(close);
-  useEffect(() => {
+  // With the dialog itself, not after the next picture: one that is seen is closed by Escape.
+  useLayoutEffect(() => {
     if (!open) return;
     const me = { help },
       opener = nowhere() ? focused : (document.activeElement as HTMLElement),
