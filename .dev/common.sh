@@ -45,12 +45,12 @@ check_machine() {
   mkdir -p "$HOME"
 }
 
-# One compiler job per core, but no more than the memory carries: a translation unit with Beast takes about 1.2 GB.
+# One compiler job per core, but no more than the memory carries: a translation unit with Beast takes up to 1.8 GB.
 # Where the machine does not tell (no /proc in a chroot), one job.
 jobs_count() {
   local cores memory_jobs
   cores=$(nproc 2>/dev/null) || cores=1
-  memory_jobs=$(awk '/MemAvailable/ {print int($2 / 1500000)}' /proc/meminfo 2>/dev/null) || memory_jobs=1
+  memory_jobs=$(awk '/MemAvailable/ {print int($2 / 1800000)}' /proc/meminfo 2>/dev/null) || memory_jobs=1
   ((memory_jobs >= 1)) || memory_jobs=1
   echo $((cores < memory_jobs ? cores : memory_jobs))
 }
