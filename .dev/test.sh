@@ -77,11 +77,11 @@ verdicts() {
 }
 
 # to_run_alone JUNIT: names as a regular expression. Tests work in real time with ports, disks, a browser, an aircraft, beside another test
-# on the other core: one to six that failed are run once more, alone. More than six stand.
+# on the other core: one to three that failed are run once more, alone. More than three stand.
 to_run_alone() {
   verdicts "$1" | awk '
     $1 == "failed" { name = $2; gsub(/[^A-Za-z0-9_\/-]/, ".", name); names = names (failed++ ? "|" : "") name }
-    END { if (failed >= 1 && failed <= 6) print names }'
+    END { if (failed >= 1 && failed <= 3) print names }'
 }
 
 # summarize JUNIT [JUNIT OF THOSE RUN ALONE]: names what did not just pass, then the counts. What passed only alone is named too: it is

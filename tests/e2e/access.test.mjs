@@ -68,7 +68,7 @@ test('an organization gets sites, limits and a token that sees those sites, and 
   await id('organization-sites').getByText('None yet.').waitFor();
   await id('organization-detail').getByRole('button', { name: 'Remove' }).click();
   await id('organization-detail').getByRole('button', { name: 'Press again to remove' }).click();
-  await id('organizations').getByText('There is none').waitFor();
+  await id('organizations').getByText('There are none').waitFor();
   assert.deepEqual(
     seen.errors.filter((e) => !/40[39]|507/.test(e)),
     [],

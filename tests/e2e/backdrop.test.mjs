@@ -50,7 +50,7 @@ const walls = (page, within = 'main') =>
     }
     return n;
   }, within);
-const drawn = (page, what, within) => eventually(what, async () => (await walls(page, within)) > 500, 40_000, 100);
+const drawn = (page, what, within) => eventually(what, async () => (await walls(page, within)) > 500, 15_000, 100);
 const gone = (page, what) => eventually(what, async () => (await walls(page)) < 100, 5000, 100);
 
 test('Live, Anchors, Replay and Review draw the plan under their maps; the choice puts it away in both, and is remembered', async () => {

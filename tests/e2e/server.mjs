@@ -8,9 +8,8 @@ import { fileURLToPath } from 'node:url';
 export const root = resolve(dirname(fileURLToPath(import.meta.url)), '../..');
 export const binary = process.env.ANCHORD_BINARY ?? join(root, 'build/release/anchord');
 
-/** Resolves with the first truthy answer of `probe`, asked again until `deadlineMs`; throws with `what` otherwise. Who promises a time gives it: else
- * there is time for a machine that does much beside. */
-export async function eventually(what, probe, deadlineMs = 30_000, stepMs = 20) {
+/** Resolves with the first truthy answer of `probe`, asked again until `deadlineMs`; throws with `what` otherwise. */
+export async function eventually(what, probe, deadlineMs = 10_000, stepMs = 20) {
   const end = Date.now() + deadlineMs;
   for (;;) {
     const answer = await probe();
@@ -62,7 +61,7 @@ export class Server {
   }
 
   /** Starts it and waits until /readyz answers 200. */
-  async start(deadlineMs = 60_000) {
+  async start(deadlineMs = 15_000) {
     const plain = `127.0.0.1:${this.port}`;
     const listen = this.tls ? `http://${plain},127.0.0.1:${this.securePort ?? 0}` : plain;
     const args = ['serve', '--listen', listen, `--auth=${this.auth}`, '--data-dir', this.dataDir, ...this.args];

@@ -91,7 +91,7 @@ export function OrganizationsPanel() {
       ))}
       {!all?.length && (
         <Empty loaded={all !== null} failed={problem !== ''}>
-          There is none: all sites are of one firm.
+          There are none: the sites of this server are of no organization.
         </Empty>
       )}
     </section>
