@@ -13,21 +13,21 @@ namespace {
 
 using Json = nlohmann::json;
 
-std::optional<double> number(const Json& object, const char* key) {
+std::optional<double> number_of(const Json& object, const char* key) {
   const auto value = object.value(key, Json());
   return value.is_number() ? std::optional(value.get<double>()) : std::nullopt;
 }
 
 Result<void> add_building(RestClient& client, const Json& building, SiteStructure& out) {
   Building of;
-  of.height_m = number(building, "height_m");
+  of.height_m = number_of(building, "height_m");
   BOOST_OUTCOME_TRY(const auto listed,
                     get_items(client, "/api/v1/floors?building=" + building.value("id", "")));
   std::vector<Floor> floors;
   for (const auto& floor : listed) {
     Floor& one = floors.emplace_back();
-    one.level = number(floor, "level").value_or(0);
-    one.base_height_m = number(floor, "base_height_m");
+    one.level = number_of(floor, "level").value_or(0);
+    one.base_height_m = number_of(floor, "base_height_m");
   }
   for (std::size_t i = 0; i < floors.size(); ++i) {
     BOOST_OUTCOME_TRY(const auto walls, client.get("/api/v1/floors/" + listed[i].value("id", "") + "/walls"));
@@ -43,7 +43,7 @@ Result<flight::Scene> fetch_site_scene(RestClient& client, const std::string& si
   const std::string id = to_string(uuid);
   BOOST_OUTCOME_TRY(const auto record, get_json(client, "/api/v1/sites/" + id));
   const auto origin = record.value("origin", Json());
-  if (!origin.is_object() || !number(origin, "lat") || !number(origin, "lon"))
+  if (!origin.is_object() || !number_of(origin, "lat") || !number_of(origin, "lon"))
     return make_error(Errc::invalid_argument,
                       "site " + id + " has no origin: set one, or fly its first mission");
   SiteStructure structure;
@@ -63,7 +63,7 @@ Result<flight::Scene> fetch_site_scene(RestClient& client, const std::string& si
     published[network_id.value()] = {at[1].get<double>(), at[0].get<double>(), at[2].get<double>()};
   }
   return flight::site_scene(
-      {*number(origin, "lat"), *number(origin, "lon"), number(origin, "h_m").value_or(0)}, structure,
+      {*number_of(origin, "lat"), *number_of(origin, "lon"), number_of(origin, "h_m").value_or(0)}, structure,
       published);
 }
 

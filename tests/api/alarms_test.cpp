@@ -10,7 +10,7 @@
 #include <mutex>
 #include <thread>
 
-namespace anchord::test {
+namespace anchord::test::alarms_test {
 namespace {
 
 using api::AlarmPriority;
@@ -288,4 +288,4 @@ TEST_F(Alarms, AreServedAndAcknowledgedByOperatorsOnly) {
 }
 
 }  // namespace
-}  // namespace anchord::test
+}  // namespace anchord::test::alarms_test

@@ -7,7 +7,7 @@
 #include "api/exchange/step_text.hpp"
 #include "app_fixture.hpp"
 
-namespace anchord::test {
+namespace anchord::test::anchor_files_test {
 namespace {
 
 class AnchorFiles : public AppFixture {
@@ -208,4 +208,4 @@ TEST_F(AnchorFiles, OfNothingPublishedAreEmptyAndValid) {
 }
 
 }  // namespace
-}  // namespace anchord::test
+}  // namespace anchord::test::anchor_files_test

@@ -4,7 +4,7 @@
 
 #include "kept_fixture.hpp"
 
-namespace anchord::test {
+namespace anchord::test::anchor_goal_test {
 namespace {
 
 using api::Method;
@@ -125,4 +125,4 @@ TEST_F(OneLimit, IsTheDefaultWhereNobodySaidMore) {
 }
 
 }  // namespace
-}  // namespace anchord::test
+}  // namespace anchord::test::anchor_goal_test

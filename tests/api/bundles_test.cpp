@@ -3,7 +3,7 @@
 #include "bundles_fixture.hpp"
 #include "core/ports/procedure_log.hpp"
 
-namespace anchord::test {
+namespace anchord::test::bundles_test {
 namespace {
 
 TEST_F(Bundles, CarryEveryRowToAnotherServerUnderTheSameIds) {
@@ -345,4 +345,4 @@ TEST_F(Bundles, LeaveNothingBehindInTheSpoolFolder) {
 }
 
 }  // namespace
-}  // namespace anchord::test
+}  // namespace anchord::test::bundles_test

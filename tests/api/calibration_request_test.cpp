@@ -2,7 +2,7 @@
 #include "api/calibration/calibration_service.hpp"
 #include "app_fixture.hpp"
 
-namespace anchord::test {
+namespace anchord::test::calibration_request_test {
 namespace {
 
 TEST(CalibrationRequest, TakesPriorsUnderTheNameTheyHadUpTo01ButNotUnderBoth) {
@@ -33,4 +33,4 @@ TEST(CalibrationRequest, TakesPriorsUnderTheNameTheyHadUpTo01ButNotUnderBoth) {
 }
 
 }  // namespace
-}  // namespace anchord::test
+}  // namespace anchord::test::calibration_request_test

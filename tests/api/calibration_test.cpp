@@ -7,7 +7,7 @@
 #include "core/ports/mission_store.hpp"
 #include "tests/core/localize/flight_support.hpp"
 
-namespace anchord::test {
+namespace anchord::test::calibration_test {
 namespace {
 
 using anchord::testing::MadeFlight;
@@ -573,4 +573,4 @@ TEST_F(DatumChanges, SayWhatIsWrongWithThem) {
 }
 
 }  // namespace
-}  // namespace anchord::test
+}  // namespace anchord::test::calibration_test

@@ -13,7 +13,7 @@
 
 #include <nlohmann/json.hpp>
 
-namespace anchord::api {
+namespace anchord::api::calibration_work_test {
 namespace {
 
 using anchord::testing::MadeFlight;
@@ -292,4 +292,4 @@ TEST(CalibrationMessage, OfAnHourIsWithinItsLimit) {
 }
 
 }  // namespace
-}  // namespace anchord::api
+}  // namespace anchord::api::calibration_work_test

@@ -7,10 +7,10 @@
 #include "core/ports/mission_store.hpp"
 #include "tests/api/app_fixture.hpp"
 
-namespace anchord::test {
+namespace anchord::test::cir_archive_test {
 namespace {
 
-using testing::HasSubstr;
+using ::testing::HasSubstr;
 
 constexpr std::int64_t k_day_ns = 86'400LL * 1'000'000'000;
 
@@ -68,7 +68,7 @@ TEST_F(CirArchiveApi, MovesWhatLandedLongerAgoThanTheRuleAllows) {
   const auto old = flight(31), recent = flight(29), flying = flight(std::nullopt);
   const auto before = json(get("/api/v1/ranges", {{"mission", old}, {"cir", "true"}}));
   app_->housekeeping_round();
-  EXPECT_THAT(archived(), testing::ElementsAre(old));
+  EXPECT_THAT(archived(), ::testing::ElementsAre(old));
   EXPECT_EQ(json(get("/api/v1/ranges", {{"mission", old}, {"cir", "true"}})), before);
   EXPECT_EQ(system()["keep_days"], 30);
   EXPECT_EQ(system()["n_moved"], 10);
@@ -102,7 +102,7 @@ TEST_F(CirArchiveApi, LeavesInTheDatabaseWhatWasBroughtBack) {
   app_->housekeeping_round();
   EXPECT_TRUE(archived().empty());
   EXPECT_EQ(move(old, "file").status, 200);
-  EXPECT_THAT(archived(), testing::ElementsAre(old));
+  EXPECT_THAT(archived(), ::testing::ElementsAre(old));
 }
 
 TEST_F(CirArchiveApi, RefusesAFlightInTheAirAndWordsItDoesNotKnow) {
@@ -131,7 +131,7 @@ TEST_F(CirArchiveApi, WritesNoFileOnADiskThatIsNearlyFull) {
   EXPECT_EQ(move(old, "file").status, 507);
   free_bytes_ = 10ULL << 30;
   app_->housekeeping_round();
-  EXPECT_THAT(archived(), testing::ElementsAre(old));
+  EXPECT_THAT(archived(), ::testing::ElementsAre(old));
   EXPECT_TRUE(system()["problem"].is_null());
 }
 
@@ -149,4 +149,4 @@ TEST_F(CirArchiveApi, NamesTheFileThatARangeNeeds) {
 }
 
 }  // namespace
-}  // namespace anchord::test
+}  // namespace anchord::test::cir_archive_test

@@ -10,7 +10,7 @@
 #include "core/ports/backups.hpp"
 #include "tests/paths.hpp"
 
-namespace anchord::test {
+namespace anchord::test::contract_test {
 namespace {
 
 std::set<std::string> documented() {
@@ -83,4 +83,4 @@ TEST_F(Contract, RequestExamplesOfTheDashboardAreAccepted) {
 }
 
 }  // namespace
-}  // namespace anchord::test
+}  // namespace anchord::test::contract_test

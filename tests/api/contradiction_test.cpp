@@ -7,7 +7,7 @@
 #include "core/ports/mission_store.hpp"
 #include "tests/core/localize/flight_support.hpp"
 
-namespace anchord::test {
+namespace anchord::test::contradiction_test {
 namespace {
 
 using anchord::testing::MadeFlight;
@@ -180,4 +180,4 @@ TEST_F(Contradicted, AnchorsAreNotAnyMoreOnceALaterFlightAgreesOrTheyAreRetired)
 }
 
 }  // namespace
-}  // namespace anchord::test
+}  // namespace anchord::test::contradiction_test

@@ -7,7 +7,7 @@
 #include "core/types/anchor.hpp"
 #include "drivers/sim/flight.hpp"
 
-namespace anchord::test {
+namespace anchord::test::evidence_test {
 namespace {
 
 using api::Method;
@@ -269,4 +269,4 @@ TEST(ReportText, WritesNumbersWithATrueMinusAndNoMinusZero) {
 }
 
 }  // namespace
-}  // namespace anchord::test
+}  // namespace anchord::test::evidence_test

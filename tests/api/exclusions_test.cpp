@@ -11,7 +11,7 @@
 #include "core/ports/mission_store.hpp"
 #include "tests/core/localize/flight_support.hpp"
 
-namespace anchord::test {
+namespace anchord::test::exclusions_test {
 namespace {
 
 using api::Method;
@@ -201,4 +201,4 @@ TEST_F(Exclusions, AFileOfThemThatIsWrongIsNamedByItsPlace) {
 }
 
 }  // namespace
-}  // namespace anchord::test
+}  // namespace anchord::test::exclusions_test

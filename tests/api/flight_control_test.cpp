@@ -7,7 +7,7 @@
 #include "core/ports/access_store.hpp"
 #include "flights_fixture.hpp"
 
-namespace anchord::test {
+namespace anchord::test::flight_control_test {
 namespace {
 
 TEST_F(Flights, OneOfEightTakesControl) {
@@ -18,8 +18,8 @@ TEST_F(Flights, OneOfEightTakesControl) {
     for (auto& one : status)
       threads.emplace_back([&] { one = post(base() + "/control", R"({"action":"take"})").status; });
   }
-  EXPECT_EQ(std::ranges::count(status, 200), 1) << testing::PrintToString(status);
-  EXPECT_EQ(std::ranges::count(status, 409), 7) << testing::PrintToString(status);
+  EXPECT_EQ(std::ranges::count(status, 200), 1) << ::testing::PrintToString(status);
+  EXPECT_EQ(std::ranges::count(status, 409), 7) << ::testing::PrintToString(status);
 }
 
 TEST_F(Flights, ALeaseOnAMissionThatIsNotFlownBlocksNoOther) {
@@ -101,4 +101,4 @@ TEST_F(Flights, OnlyOneHasControl) {
 }
 
 }  // namespace
-}  // namespace anchord::test
+}  // namespace anchord::test::flight_control_test

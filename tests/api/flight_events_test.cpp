@@ -10,7 +10,7 @@
 #include "core/ports/event_store.hpp"
 #include "kept_fixture.hpp"
 
-namespace anchord::test {
+namespace anchord::test::flight_events_test {
 namespace {
 
 class FlightEventRoutes : public KeptFixture {
@@ -159,4 +159,4 @@ TEST_F(FlightEventsRules, OfNoMissionAreNotKept) {
 }
 
 }  // namespace
-}  // namespace anchord::test
+}  // namespace anchord::test::flight_events_test

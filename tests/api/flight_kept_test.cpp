@@ -17,7 +17,7 @@
 #include "core/ports/token_store.hpp"
 #include "kept_fixture.hpp"
 
-namespace anchord::test {
+namespace anchord::test::flight_kept_test {
 namespace {
 
 using api::Method;
@@ -500,4 +500,4 @@ TEST_F(KeptAnswers, GoAfterADayOfRunningAndNotWithTheClock) {
 }
 
 }  // namespace
-}  // namespace anchord::test
+}  // namespace anchord::test::flight_kept_test

@@ -4,7 +4,7 @@
 
 #include "core/localize/convergence.hpp"
 
-namespace anchord::api {
+namespace anchord::api::flight_loading_test {
 namespace {
 
 FlightData part_of(int first, int last) {
@@ -60,4 +60,4 @@ TEST(FlightParts, HaveNothingOfModelsWhereNoneSpoke) {
 }
 
 }  // namespace
-}  // namespace anchord::api
+}  // namespace anchord::api::flight_loading_test

@@ -6,7 +6,7 @@
 #include "core/flight/flown_time.hpp"
 #include "flights_fixture.hpp"
 
-namespace anchord::test {
+namespace anchord::test::flights_rules_test {
 namespace {
 
 /// While a message is sent, another thread asks for what is guarded by the lock that safety is checked under.
@@ -221,4 +221,4 @@ TEST_F(Flights, TheIntervalOfSafetyChecksIsMeasuredInTheAir) {
 }
 
 }  // namespace
-}  // namespace anchord::test
+}  // namespace anchord::test::flights_rules_test

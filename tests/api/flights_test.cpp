@@ -15,7 +15,7 @@
 #include "drivers/sim/wgs84.hpp"
 #include "flights_fixture.hpp"
 
-namespace anchord::test {
+namespace anchord::test::flights_test {
 namespace {
 
 TEST_F(Flights, StartIsBlockedUntilTheChecklistIsGreen) {
@@ -550,4 +550,4 @@ TEST_F(Flights, WithoutAnAircraftToCommandThePilotIsShownWhereToGo) {
 }
 
 }  // namespace
-}  // namespace anchord::test
+}  // namespace anchord::test::flights_test

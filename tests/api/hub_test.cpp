@@ -12,7 +12,7 @@
 #include "api/stream/conversation.hpp"
 #include "api/stream/delta.hpp"
 
-namespace anchord::test {
+namespace anchord::test::hub_test {
 namespace {
 
 using Json = nlohmann::json;
@@ -487,4 +487,4 @@ TEST_F(HubRules, SaysGoodbyeToWhomComesWhileItShutsDown) {
 }
 
 }  // namespace
-}  // namespace anchord::test
+}  // namespace anchord::test::hub_test

@@ -3,7 +3,7 @@
 #include "app_fixture.hpp"
 #include "core/ports/measurement_store.hpp"
 
-namespace anchord::test {
+namespace anchord::test::ingest_test {
 namespace {
 
 using api::Method;
@@ -325,4 +325,4 @@ TEST_F(Ingest, AnswersAnIdempotencyKeyOnce) {
 }
 
 }  // namespace
-}  // namespace anchord::test
+}  // namespace anchord::test::ingest_test

@@ -8,7 +8,7 @@
 #include "app_fixture.hpp"
 #include "core/ports/devices.hpp"
 
-namespace anchord::test {
+namespace anchord::test::live_first_test {
 namespace {
 
 constexpr std::int64_t k_start_us = 1'777'889'472'000'000;
@@ -197,4 +197,4 @@ TEST_F(LiveFirst, RowsOfAMissionThatIsNotFollowedAreLiveOnceTheyAreStored) {
 }
 
 }  // namespace
-}  // namespace anchord::test
+}  // namespace anchord::test::live_first_test

@@ -1,7 +1,7 @@
 // What was declared of a flight may be corrected once it is finished: its rows stay, its estimates follow.
 #include "mission_fixture.hpp"
 
-namespace anchord::test {
+namespace anchord::test::mission_correct_test {
 namespace {
 
 class MissionCorrection : public MissionLive {
@@ -88,4 +88,4 @@ TEST_F(MissionCorrection, IsRefusedWholeWhileItRecordsOnAnOldStateAndWhereItIsNo
 }
 
 }  // namespace
-}  // namespace anchord::test
+}  // namespace anchord::test::mission_correct_test

@@ -11,7 +11,7 @@
 #include "core/ports/plan_store.hpp"
 #include "mission_fixture.hpp"
 
-namespace anchord::test {
+namespace anchord::test::mission_live_test {
 namespace {
 
 TEST_F(MissionLive, GoesOnAfterARestartWhereItWas) {
@@ -334,4 +334,4 @@ TEST_F(MissionLive, OneJointSolutionIsComputedAtATimeWhicheverFlightItIsOf) {
 }
 
 }  // namespace
-}  // namespace anchord::test
+}  // namespace anchord::test::mission_live_test

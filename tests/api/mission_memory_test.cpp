@@ -2,7 +2,7 @@
 #include "core/ports/devices.hpp"
 #include "mission_fixture.hpp"
 
-namespace anchord::test {
+namespace anchord::test::mission_memory_test {
 namespace {
 
 constexpr int k_most_at_rest = 4;  // docs/operations.md
@@ -127,4 +127,4 @@ TEST_F(MissionMemory, AMissionThatRecordsIsFollowedAgainAfterARestart) {
 }
 
 }  // namespace
-}  // namespace anchord::test
+}  // namespace anchord::test::mission_memory_test

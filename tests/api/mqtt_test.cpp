@@ -6,7 +6,7 @@
 #include "api/mqtt/topic_name.hpp"
 #include "app_fixture.hpp"
 
-namespace anchord::test {
+namespace anchord::test::mqtt_test {
 namespace {
 
 using api::Topic;
@@ -173,4 +173,4 @@ TEST(MqttStatus, IsAnAlarmOnceTheBrokerIsAwayForTenSeconds) {
 }
 
 }  // namespace
-}  // namespace anchord::test
+}  // namespace anchord::test::mqtt_test

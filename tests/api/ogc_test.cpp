@@ -5,7 +5,7 @@
 #include "app_fixture.hpp"
 #include "core/base/to_wire.hpp"
 
-namespace anchord::test {
+namespace anchord::test::ogc_test {
 namespace {
 
 using api::Role;
@@ -229,4 +229,4 @@ TEST_F(Ogc, IsForReadersAndNobodyElse) {
 }
 
 }  // namespace
-}  // namespace anchord::test
+}  // namespace anchord::test::ogc_test

@@ -10,7 +10,7 @@
 // Last: it brings <resolv.h>, whose macro `_res` breaks Eigen's headers.
 #include <httplib.h>
 
-namespace anchord::test {
+namespace anchord::test::omlox_push_test {
 namespace {
 
 using api::Method;
@@ -338,4 +338,4 @@ TEST_F(OmloxPush, RefusesWhatOnlyTheOtherKindHas) {
 }
 
 }  // namespace
-}  // namespace anchord::test
+}  // namespace anchord::test::omlox_push_test

@@ -1,7 +1,7 @@
 // The WebSocket of an omlox hub: wrapper objects and codes as chapter 13 of hub API 2.0.0 has them.
 #include "omlox_fixture.hpp"
 
-namespace anchord::test {
+namespace anchord::test::omlox_socket_test {
 namespace {
 
 class OmloxSocket : public OmloxFixture {
@@ -176,4 +176,4 @@ TEST_F(OmloxSocket, RepliesThatNobodyReadsAreBounded) {
 }
 
 }  // namespace
-}  // namespace anchord::test
+}  // namespace anchord::test::omlox_socket_test

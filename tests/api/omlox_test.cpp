@@ -3,7 +3,7 @@
 #include "api/omlox/omlox_uuid.hpp"
 #include "omlox_fixture.hpp"
 
-namespace anchord::test {
+namespace anchord::test::omlox_test {
 namespace {
 
 using api::Method;
@@ -240,4 +240,4 @@ TEST_F(Omlox, RefusesInTheFormOfOmlox) {
 }
 
 }  // namespace
-}  // namespace anchord::test
+}  // namespace anchord::test::omlox_test

@@ -3,7 +3,7 @@
 #include "api/stream/ws_handler.hpp"
 #include "site_tokens_fixture.hpp"
 
-namespace anchord::test {
+namespace anchord::test::organizations_test {
 namespace {
 
 class Organizations : public SiteTokens {
@@ -278,7 +278,7 @@ TEST_P(Organizations, BindATokenThatNamesNoSitesAndRefuseWhatContradicts) {
   EXPECT_EQ(me["requests_per_minute"], 60);
 }
 
-INSTANTIATE_TEST_SUITE_P(Bound, Organizations, testing::Values(Bound::to_organization), bound_name);
+INSTANTIATE_TEST_SUITE_P(Bound, Organizations, ::testing::Values(Bound::to_organization), bound_name);
 
 }  // namespace
-}  // namespace anchord::test
+}  // namespace anchord::test::organizations_test

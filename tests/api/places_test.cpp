@@ -10,7 +10,7 @@
 #include "tests/core/floor_plan/drawings.hpp"
 #include "tests/core/floor_plan/pictures.hpp"
 
-namespace anchord::test {
+namespace anchord::test::places_test {
 namespace {
 
 using api::Method;
@@ -489,4 +489,4 @@ TEST_F(Places, OutliveARestart) {
 }
 
 }  // namespace
-}  // namespace anchord::test
+}  // namespace anchord::test::places_test

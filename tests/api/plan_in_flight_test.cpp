@@ -8,7 +8,7 @@
 #include "drivers/sim/wgs84.hpp"
 #include "flights_fixture.hpp"
 
-namespace anchord::test {
+namespace anchord::test::plan_in_flight_test {
 namespace {
 
 using Eigen::Vector3d;
@@ -350,4 +350,4 @@ TEST_F(PlanInFlight, WhatIsNotFlownCannotBeChanged) {
 }
 
 }  // namespace
-}  // namespace anchord::test
+}  // namespace anchord::test::plan_in_flight_test

@@ -7,7 +7,7 @@
 
 #include "app_fixture.hpp"
 
-namespace anchord::test {
+namespace anchord::test::plans_test {
 namespace {
 
 /// A 30 x 20 m hall: at 51 degrees a degree of longitude has 70.2 km, one of latitude 111.2 km.
@@ -261,7 +261,7 @@ TEST_F(Plans, TellWhatIsWrongWithKml) {
     EXPECT_EQ(answer.status, 422) << answer.body;
     return answer.body;
   };
-  using testing::HasSubstr;
+  using ::testing::HasSubstr;
   EXPECT_THAT(wrong("<Point><coordinates>3.7,51</coordinates></Point>"), HasSubstr("relativeToGround"));
   EXPECT_THAT(
       wrong("<Point><altitudeMode>absolute</altitudeMode><coordinates>3.7,51,60</coordinates></Point>"),
@@ -294,4 +294,4 @@ TEST_F(Plans, OnlyAnOperatorMayChangeThem) {
 }
 
 }  // namespace
-}  // namespace anchord::test
+}  // namespace anchord::test::plans_test

@@ -3,7 +3,7 @@
 #include "core/base/to_wire.hpp"
 #include "core/types/anchor.hpp"
 
-namespace anchord::test {
+namespace anchord::test::resources_test {
 namespace {
 
 using api::Method;
@@ -289,4 +289,4 @@ TEST_F(Resources, RefuseToMixLocalFramesOfDifferentSites) {
 }
 
 }  // namespace
-}  // namespace anchord::test
+}  // namespace anchord::test::resources_test

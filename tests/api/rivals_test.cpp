@@ -12,7 +12,7 @@
 #include "core/ports/revision_store.hpp"
 #include "core/types/anchor.hpp"
 
-namespace anchord::test {
+namespace anchord::test::rivals_test {
 namespace {
 
 using api::Method;
@@ -40,7 +40,7 @@ class Rivals : public AppFixture {
   }
   /// One 2xx; all others say that somebody else was first.
   static void expect_one_wins(const std::multiset<int>& status, int good, const std::set<int>& others) {
-    EXPECT_EQ(status.count(good), 1u) << testing::PrintToString(status);
+    EXPECT_EQ(status.count(good), 1u) << ::testing::PrintToString(status);
     for (const int one : status) EXPECT_TRUE(one == good || others.contains(one)) << one;
   }
   std::string calibration() {
@@ -183,4 +183,4 @@ TEST_F(Rivals, LabelsOfEightAreEachWhole) {
 }
 
 }  // namespace
-}  // namespace anchord::test
+}  // namespace anchord::test::rivals_test

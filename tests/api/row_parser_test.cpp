@@ -11,7 +11,7 @@
 #include "core/base/base64.hpp"
 #include "core/base/to_wire.hpp"
 
-namespace anchord::api {
+namespace anchord::api::row_parser_test {
 namespace {
 
 using Json = nlohmann::ordered_json;
@@ -254,4 +254,4 @@ TEST(RowParser, AgreesOnRowsSpoiltInTheirBytes) {
 }
 
 }  // namespace
-}  // namespace anchord::api
+}  // namespace anchord::api::row_parser_test

@@ -10,7 +10,7 @@
 #include "core/base/to_wire.hpp"
 #include "tests/core/types/full_rows.hpp"
 
-namespace anchord::api {
+namespace anchord::api::row_text_test {
 namespace {
 
 using Ordered = nlohmann::ordered_json;
@@ -96,4 +96,4 @@ TEST(RowText, WritesEveryNumberAsADocumentDoes) {
 }
 
 }  // namespace
-}  // namespace anchord::api
+}  // namespace anchord::api::row_text_test

@@ -2,7 +2,7 @@
 // along.
 #include "bundles_fixture.hpp"
 
-namespace anchord::test {
+namespace anchord::test::site_bundles_test {
 namespace {
 
 TEST_F(Bundles, BringTheEventsOfTheirFlightOnce) {
@@ -146,4 +146,4 @@ TEST_F(Bundles, OfASiteAreRefusedWholeWhereAnyPartIsNotWhatItSays) {
 }
 
 }  // namespace
-}  // namespace anchord::test
+}  // namespace anchord::test::site_bundles_test

@@ -6,7 +6,7 @@
 #include "app_fixture.hpp"
 #include "core/geo/enu.hpp"
 
-namespace anchord::test {
+namespace anchord::test::site_structures_test {
 namespace {
 
 using ::testing::ElementsAre;
@@ -175,4 +175,4 @@ TEST_F(SiteWalls, MakeThePredictedErrorThatOfTheirMaterial) {
 }
 
 }  // namespace
-}  // namespace anchord::test
+}  // namespace anchord::test::site_structures_test

@@ -12,7 +12,7 @@
 #include "site_tokens_fixture.hpp"
 #include "tests/api/zip_builder.hpp"
 
-namespace anchord::test {
+namespace anchord::test::site_tokens_bundle_test {
 namespace {
 
 /// A server where nothing is yet.
@@ -236,8 +236,8 @@ TEST_P(SiteTokenBundles, QuotasAreSetByWhoSeesAllAndHoldTheNextFlightBack) {
   EXPECT_EQ(post_as(bravo_, "/api/v1/missions", next).status, 201);
 }
 
-INSTANTIATE_TEST_SUITE_P(Bound, SiteTokenBundles, testing::Values(Bound::to_sites, Bound::to_organization),
+INSTANTIATE_TEST_SUITE_P(Bound, SiteTokenBundles, ::testing::Values(Bound::to_sites, Bound::to_organization),
                          bound_name);
 
 }  // namespace
-}  // namespace anchord::test
+}  // namespace anchord::test::site_tokens_bundle_test

@@ -15,14 +15,14 @@ enum class Bound : std::uint8_t {
   to_sites,         ///< to its site, which was there before
   to_organization,  ///< to its organization; the site is of later, made with the token
 };
-inline std::string bound_name(const testing::TestParamInfo<Bound>& info) {
+inline std::string bound_name(const ::testing::TestParamInfo<Bound>& info) {
   return info.param == Bound::to_sites ? "ToSites" : "ToOrganization";
 }
 
 /// Two firms on one server: each has a site, a token bound to it with every role, and of everything that can
 /// be made of a site one, made with that token. What is of the first carries "alfa" in its names ("alpha"
 /// stands in every style of a map), what is of the second "bravo".
-class SiteTokens : public AppFixture, public testing::WithParamInterface<Bound> {
+class SiteTokens : public AppFixture, public ::testing::WithParamInterface<Bound> {
  protected:
   using Method = api::Method;
 

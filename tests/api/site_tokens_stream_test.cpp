@@ -4,7 +4,7 @@
 #include "api/stream/ws_handler.hpp"
 #include "site_tokens_fixture.hpp"
 
-namespace anchord::test {
+namespace anchord::test::site_tokens_stream_test {
 namespace {
 
 class SiteTokenStream : public SiteTokens {
@@ -119,8 +119,8 @@ TEST_P(SiteTokenStream, AResumedStreamLeavesOutWhatWasOfAnotherSite) {
   bravo->on_close();
 }
 
-INSTANTIATE_TEST_SUITE_P(Bound, SiteTokenStream, testing::Values(Bound::to_sites, Bound::to_organization),
+INSTANTIATE_TEST_SUITE_P(Bound, SiteTokenStream, ::testing::Values(Bound::to_sites, Bound::to_organization),
                          bound_name);
 
 }  // namespace
-}  // namespace anchord::test
+}  // namespace anchord::test::site_tokens_stream_test

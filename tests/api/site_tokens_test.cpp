@@ -6,7 +6,7 @@
 #include "core/ports/access_store.hpp"
 #include "site_tokens_fixture.hpp"
 
-namespace anchord::test {
+namespace anchord::test::site_tokens_test {
 namespace {
 
 using api::SiteRule;
@@ -381,8 +381,8 @@ TEST_P(SiteTokenRoutes, ATokenWhoseSiteIsGoneSeesNothing) {
   EXPECT_TRUE(json(as(who, Method::get, "/api/v1/missions"))["items"].empty());
 }
 
-INSTANTIATE_TEST_SUITE_P(Bound, SiteTokenRoutes, testing::Values(Bound::to_sites, Bound::to_organization),
+INSTANTIATE_TEST_SUITE_P(Bound, SiteTokenRoutes, ::testing::Values(Bound::to_sites, Bound::to_organization),
                          bound_name);
 
 }  // namespace
-}  // namespace anchord::test
+}  // namespace anchord::test::site_tokens_test

@@ -11,7 +11,7 @@
 #include "core/ports/calibration_store.hpp"
 #include "tests/core/localize/flight_support.hpp"
 
-namespace anchord::test {
+namespace anchord::test::starnet_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -282,4 +282,4 @@ TEST_F(StarnetRoute, RefusesACalibrationOfAnEarlierVersionWithWhatToDo) {
 }
 
 }  // namespace
-}  // namespace anchord::test
+}  // namespace anchord::test::starnet_test

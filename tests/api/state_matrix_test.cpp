@@ -6,7 +6,7 @@
 #include "core/ports/calibration_store.hpp"
 #include "kept_fixture.hpp"
 
-namespace anchord::test {
+namespace anchord::test::state_matrix_test {
 namespace {
 
 using api::Method;
@@ -177,4 +177,4 @@ TEST_F(StateMatrix, EveryRouteThatDeletesIsKnown) {
 }
 
 }  // namespace
-}  // namespace anchord::test
+}  // namespace anchord::test::state_matrix_test

@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-namespace anchord::api {
+namespace anchord::api::support_bundle_test {
 namespace {
 
 TEST(WithoutSecrets, LeavesOutWhatOpensDoorsAndKeepsTheRest) {
@@ -39,4 +39,4 @@ TEST(Tar, HasItsHeadersAndBlocksAsPosixSays) {
 }
 
 }  // namespace
-}  // namespace anchord::api
+}  // namespace anchord::api::support_bundle_test

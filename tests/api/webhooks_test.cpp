@@ -11,7 +11,7 @@
 // Last: it brings <resolv.h>, whose macro `_res` breaks Eigen's headers.
 #include <httplib.h>
 
-namespace anchord::test {
+namespace anchord::test::webhooks_test {
 namespace {
 
 using api::Method;
@@ -333,4 +333,4 @@ TEST_F(Webhooks, AreForIntegratorsAndAdministrators) {
 }
 
 }  // namespace
-}  // namespace anchord::test
+}  // namespace anchord::test::webhooks_test

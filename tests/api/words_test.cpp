@@ -42,7 +42,7 @@
 #include "core/types/webhook.hpp"
 #include "drivers/device/supervisor.hpp"
 
-namespace anchord::api {
+namespace anchord::api::words_test {
 namespace {
 
 using Json = nlohmann::json;
@@ -374,4 +374,4 @@ TEST(WireWords, AreThoseOfAsyncApi) {
 }
 
 }  // namespace
-}  // namespace anchord::api
+}  // namespace anchord::api::words_test

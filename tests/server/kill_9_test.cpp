@@ -22,6 +22,7 @@
 #include "tests/paths.hpp"
 #include "tests/server/storage/scratch_dir.hpp"
 
+namespace anchord::kill_9_test {
 namespace {
 
 using SteadyClock = std::chrono::steady_clock;
@@ -226,3 +227,4 @@ TEST(Kill9, LosesNoAcknowledgedRowAndStoresNoneTwice) {
 }
 
 }  // namespace
+}  // namespace anchord::kill_9_test

@@ -23,7 +23,7 @@
 #include "server/http/http_client.hpp"
 #include "tests/paths.hpp"
 
-namespace anchord {
+namespace anchord::rest_flights_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -356,4 +356,4 @@ TEST_F(RestFlights, ViralDroneReachesPlainLeastSquaresBetweenAnchors) {
 }
 
 }  // namespace
-}  // namespace anchord
+}  // namespace anchord::rest_flights_test

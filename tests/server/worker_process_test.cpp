@@ -20,7 +20,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
-namespace anchord::server {
+namespace anchord::server::worker_process_test {
 namespace {
 
 class WorkerProcess : public testing::Test {
@@ -373,4 +373,4 @@ TEST_F(WorkerProcess, ADecoderThatDiesSaysNothingOfTraining) {
       << result.error().message;
 }
 
-}  // namespace anchord::server
+}  // namespace anchord::server::worker_process_test

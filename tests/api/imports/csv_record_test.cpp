@@ -10,7 +10,7 @@
 
 #include "api/formats/csv_table.hpp"
 
-namespace anchord::api {
+namespace anchord::api::csv_record_test {
 namespace {
 
 using Cells = std::vector<std::string>;
@@ -83,7 +83,7 @@ TEST(CsvRecord, ReadsALineAsOneRecordEvenAnEmptyOne) {
   EXPECT_FALSE(record.read("a\nb"));
 }
 
-class CsvFile : public testing::Test {
+class CsvFile : public ::testing::Test {
  protected:
   void SetUp() override {
     char path[] = "/tmp/anchord_csv_XXXXXX";
@@ -120,4 +120,4 @@ TEST_F(CsvFile, RefusesALineWithoutEnd) {
 }
 
 }  // namespace
-}  // namespace anchord::api
+}  // namespace anchord::api::csv_record_test

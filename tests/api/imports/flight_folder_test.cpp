@@ -9,7 +9,7 @@
 
 #include "api/calibration/kit_profile_json.hpp"
 
-namespace anchord {
+namespace anchord::flight_folder_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -297,4 +297,4 @@ TEST(KitProfileJson, NamesWhatIsWrong) {
 }
 
 }  // namespace
-}  // namespace anchord
+}  // namespace anchord::flight_folder_test

@@ -12,7 +12,7 @@
 #include "core/base/base64.hpp"
 #include "tests/paths.hpp"
 
-namespace anchord::api {
+namespace anchord::api::foreign_flight_test {
 namespace {
 
 using Json = nlohmann::json;
@@ -184,4 +184,4 @@ TEST(ForeignFlight, NamesTheOptionThatSaysWhatIsNotKnown) {
 }
 
 }  // namespace
-}  // namespace anchord::api
+}  // namespace anchord::api::foreign_flight_test

@@ -10,7 +10,7 @@
 #include "api/formats/flight_plan_output.hpp"
 #include "tests/paths.hpp"
 
-namespace anchord::api {
+namespace anchord::api::outline_geojson_test {
 namespace {
 
 std::string example() {
@@ -40,15 +40,15 @@ TEST(Outline, ReadsTheExampleInMetres) {
 }
 
 TEST(Outline, NamesWhatIsWrongByPointer) {
-  EXPECT_THAT(outline_pointers("{"), testing::SizeIs(1));
+  EXPECT_THAT(outline_pointers("{"), ::testing::SizeIs(1));
   EXPECT_THAT(outline_pointers(R"({"type":"Point","coordinates":[1,2]})"),
-              testing::ElementsAre("/type unknown_value"));
+              ::testing::ElementsAre("/type unknown_value"));
   EXPECT_THAT(outline_pointers(R"({"type":"Polygon","coordinates":[[[3,51],[3.1,51],[3.1,"x"]]]})"),
-              testing::ElementsAre("/coordinates/0/2 wrong_type"));
+              ::testing::ElementsAre("/coordinates/0/2 wrong_type"));
   EXPECT_THAT(outline_pointers(R"({"type":"Polygon","coordinates":[[[51,300],[3.1,51],[3.1,52]]]})"),
-              testing::ElementsAre("/coordinates/0/0 out_of_range"));
+              ::testing::ElementsAre("/coordinates/0/0 out_of_range"));
   EXPECT_THAT(outline_pointers(R"({"type":"FeatureCollection","features":[]})"),
-              testing::ElementsAre(" required"));
+              ::testing::ElementsAre(" required"));
 }
 
 TEST(Outline, ReadsSeveralPartsAsTheirHull) {
@@ -75,7 +75,7 @@ TEST(Outline, ThatCrossesItselfIsRefused) {
   EXPECT_THAT(
       outline_pointers(
           R"({"type":"Polygon","coordinates":[[[3,51],[3.001,51.001],[3.001,51],[3,51.001],[3,51]]]})"),
-      testing::ElementsAre("/coordinates/0 self_crossing"));
+      ::testing::ElementsAre("/coordinates/0 self_crossing"));
 }
 
 TEST(Outline, PointsBesideTheBuildingArePassedOver) {
@@ -114,4 +114,4 @@ TEST(FlightPlanOutput, WritesAPlanThatQGroundControlReads) {
 }
 
 }  // namespace
-}  // namespace anchord::api
+}  // namespace anchord::api::outline_geojson_test

@@ -9,10 +9,10 @@
 #include "api/formats/plan_output.hpp"
 #include "tests/paths.hpp"
 
-namespace anchord::api {
+namespace anchord::api::plan_input_test {
 namespace {
 
-using testing::HasSubstr;
+using ::testing::HasSubstr;
 
 std::vector<std::string> pointers(std::string_view json) {
   std::vector<FieldError> errors;
@@ -42,23 +42,23 @@ TEST(PlanInput, ReadsTheExampleOfTheDocumentationAndDecidesAsTheDissertation) {
 TEST(PlanInput, ReportsEverythingWrongAtOnceWithItsPointer) {
   EXPECT_THAT(pointers(R"({"dims":2,"visited_m":[[1,2],[1,"x"],[3]],"rule":"best","stepp":1,
       "anchors":[{"position_m":[0,0],"measured_at":[9]},{"name":"b"}],"grid":{"step_m":-1}})"),
-              testing::UnorderedElementsAre("/visited_m/1/1 wrong_type", "/visited_m/2 wrong_type",
+              ::testing::UnorderedElementsAre("/visited_m/1/1 wrong_type", "/visited_m/2 wrong_type",
                                             "/rule unknown_value", "/stepp unknown_field",
                                             "/anchors/0/measured_at out_of_range",
                                             "/anchors/1/position_m required", "/grid/step_m out_of_range"));
 }
 
 TEST(PlanInput, RefusesWhatIsNoPlanAtAll) {
-  EXPECT_THAT(pointers("{"), testing::ElementsAre(HasSubstr("malformed")));
-  EXPECT_THAT(pointers("[]"), testing::ElementsAre(HasSubstr("wrong_type")));
-  EXPECT_THAT(pointers("{}"), testing::UnorderedElementsAre("/visited_m required", "/anchors required"));
+  EXPECT_THAT(pointers("{"), ::testing::ElementsAre(HasSubstr("malformed")));
+  EXPECT_THAT(pointers("[]"), ::testing::ElementsAre(HasSubstr("wrong_type")));
+  EXPECT_THAT(pointers("{}"), ::testing::UnorderedElementsAre("/visited_m required", "/anchors required"));
   EXPECT_THAT(pointers(R"({"visited_m":[[1,2,3]],"anchors":[{"position_m":[1,2,NaN]}]})"),
-              testing::SizeIs(1));
+              ::testing::SizeIs(1));
 }
 
 TEST(PlanInput, NeedsHeightsInSpaceAndAllowsThemInThePlane) {
   EXPECT_THAT(pointers(R"({"visited_m":[[1,2]],"anchors":[{"position_m":[1,2,3]}]})"),
-              testing::ElementsAre("/visited_m/0 wrong_type"));
+              ::testing::ElementsAre("/visited_m/0 wrong_type"));
   std::vector<FieldError> errors;
   EXPECT_TRUE(
       read_plan_input(R"({"dims":2,"visited_m":[[1,2,9]],"anchors":[{"position_m":[5,2]}]})", errors));
@@ -67,7 +67,7 @@ TEST(PlanInput, NeedsHeightsInSpaceAndAllowsThemInThePlane) {
 TEST(PlanInput, RefusesAMatrixThatIsNoCovariance) {
   EXPECT_THAT(
       pointers(R"({"visited_m":[[1,2,3]],"anchors":[{"position_m":[1,2,9],"covariance_m2":[1,2,0,1,0,1]}]})"),
-      testing::ElementsAre("/anchors/0/covariance_m2 out_of_range"));
+      ::testing::ElementsAre("/anchors/0/covariance_m2 out_of_range"));
 }
 
 TEST(PlanInput, TakesWallsFenceAndMirror) {
@@ -88,4 +88,4 @@ TEST(PlanInput, TakesWallsFenceAndMirror) {
 }
 
 }  // namespace
-}  // namespace anchord::api
+}  // namespace anchord::api::plan_input_test

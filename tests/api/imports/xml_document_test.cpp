@@ -9,10 +9,10 @@
 
 #include "core/base/text.hpp"
 
-namespace anchord::api {
+namespace anchord::api::xml_document_test {
 namespace {
 
-using testing::HasSubstr;
+using ::testing::HasSubstr;
 
 std::string why_not(const std::string& text) {
   pugi::xml_document document;
@@ -99,4 +99,4 @@ TEST(XmlDocument, EndsAtEveryCutOfADocument) {
 }
 
 }  // namespace
-}  // namespace anchord::api
+}  // namespace anchord::api::xml_document_test

@@ -9,7 +9,7 @@
 
 #include "tests/api/zip_builder.hpp"
 
-namespace anchord::api {
+namespace anchord::api::zip_archive_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -145,4 +145,4 @@ TEST_F(ZipArchive, TellsAContentThatDoesNotFitItsChecksum) {
 }
 
 }  // namespace
-}  // namespace anchord::api
+}  // namespace anchord::api::zip_archive_test

@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-namespace anchord::api {
+namespace anchord::api::campaign_test {
 
 TEST(Campaign, ReadsPlainTextOfOneMeasurementALine) {
   const auto read = import_campaign(
@@ -173,4 +173,4 @@ TEST(Campaign, HostileTextEndsInAnErrorNotInACrash) {
   }
 }
 
-}  // namespace anchord::api
+}  // namespace anchord::api::campaign_test

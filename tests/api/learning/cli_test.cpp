@@ -13,7 +13,7 @@
 
 #include "tests/paths.hpp"
 
-namespace anchord {
+namespace anchord::cli_test {
 namespace {
 
 struct Ran {
@@ -21,12 +21,12 @@ struct Ran {
   std::string out, err;
 };
 
-class LearningCli : public testing::Test {
+class LearningCli : public ::testing::Test {
  protected:
   void SetUp() override {
     dir_ = std::filesystem::temp_directory_path() /
            ("anchord_cli_" + std::to_string(getpid()) + "_" +
-            testing::UnitTest::GetInstance()->current_test_info()->name());
+            ::testing::UnitTest::GetInstance()->current_test_info()->name());
     std::filesystem::create_directories(dir_);
     // Forty-eight placements in six rooms; walls weaken the first path and delay it by 0.3 to 0.8 m.
     std::ofstream rooms{dir_ / "rooms.csv"};
@@ -178,4 +178,4 @@ TEST_F(LearningCli, UnusableInputExitsWithTwoNamesItAndLeavesNoModel) {
   EXPECT_NE(model.err.find("/manifest"), std::string::npos) << model.err;
 }
 
-}  // namespace anchord
+}  // namespace anchord::cli_test

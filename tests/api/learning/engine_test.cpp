@@ -1,7 +1,7 @@
 // Whose code trains: our own, or OpenCV's where a run asks for it.
 #include "tests/api/app_fixture.hpp"
 
-namespace anchord::test {
+namespace anchord::test::engine_test {
 namespace {
 
 class TrainingEngine : public AppFixture {
@@ -52,4 +52,4 @@ TEST_F(TrainingEngine, SaysWhatOpenCvHasWhereItHasNotWhatWasAsked) {
 }
 
 }  // namespace
-}  // namespace anchord::test
+}  // namespace anchord::test::engine_test

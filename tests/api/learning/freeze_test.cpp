@@ -8,7 +8,7 @@
 #include "core/ports/mission_store.hpp"
 #include "tests/api/app_fixture.hpp"
 
-namespace anchord::test {
+namespace anchord::test::freeze_test {
 namespace {
 
 using Freeze = AppFixture;
@@ -62,4 +62,4 @@ TEST_F(Freeze, AFlightDeletedWhileItIsFrozenIsFrozenWholeOrNotAtAll) {
 }
 
 }  // namespace
-}  // namespace anchord::test
+}  // namespace anchord::test::freeze_test

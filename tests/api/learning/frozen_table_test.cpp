@@ -6,7 +6,7 @@
 #include "api/formats/labelled_table.hpp"
 #include "api/learning/freeze_rows.hpp"
 
-namespace anchord::api {
+namespace anchord::api::frozen_table_test {
 namespace {
 
 using nlos::Feature;
@@ -162,4 +162,4 @@ TEST(FrozenTable, RegistersTrainWhereTheyAreNamedAndOnlyThere) {
   EXPECT_EQ(learning_rows(table, wish).error().code, Errc::not_found);
 }
 
-}  // namespace anchord::api
+}  // namespace anchord::api::frozen_table_test

@@ -11,15 +11,15 @@
 #include "api/formats/gzip_lines.hpp"
 #include "api/learning/dataset_table.hpp"
 
-namespace anchord::api {
+namespace anchord::api::labelled_table_test {
 namespace {
 
-class LabelledTableTest : public testing::Test {
+class LabelledTableTest : public ::testing::Test {
  protected:
   void SetUp() override {
     dir_ = std::filesystem::temp_directory_path() /
            ("anchord_table_" + std::to_string(getpid()) + "_" +
-            testing::UnitTest::GetInstance()->current_test_info()->name());
+            ::testing::UnitTest::GetInstance()->current_test_info()->name());
     std::filesystem::create_directories(dir_);
   }
   void TearDown() override { std::filesystem::remove_all(dir_); }
@@ -249,4 +249,4 @@ TEST_F(LabelledTableTest, JoinsCirsAndDropsRowsWithoutOne) {
   EXPECT_EQ(t.value().dropped.at("no CIR in the CIR table").first, 1U);
 }
 
-}  // namespace anchord::api
+}  // namespace anchord::api::labelled_table_test

@@ -9,7 +9,7 @@
 #include "core/ml/recipe.hpp"
 #include "core/nlos/features.hpp"
 
-namespace anchord::api {
+namespace anchord::api::model_artifact_test {
 namespace {
 
 ml::Dataset ring() {
@@ -51,7 +51,7 @@ std::string replaced(std::string text, const std::string& from, const std::strin
 
 }  // namespace
 
-class EveryMethod : public testing::TestWithParam<ml::Method> {};
+class EveryMethod : public ::testing::TestWithParam<ml::Method> {};
 
 TEST_P(EveryMethod, PredictsTheSameAfterWritingAndReadingAndWritesTheSameBytes) {
   const auto model = model_of(GetParam());
@@ -66,7 +66,7 @@ TEST_P(EveryMethod, PredictsTheSameAfterWritingAndReadingAndWritesTheSameBytes) 
 }
 
 INSTANTIATE_TEST_SUITE_P(ModelArtifact, EveryMethod,
-                         testing::Values(ml::Method::logistic, ml::Method::random_forest, ml::Method::svm,
+                         ::testing::Values(ml::Method::logistic, ml::Method::random_forest, ml::Method::svm,
                                          ml::Method::boosted, ml::Method::average));
 
 TEST(ModelArtifact, RefusesWhatIsWrongAndNamesThePlace) {
@@ -136,4 +136,4 @@ TEST(ModelArtifact, KeepsTheBiasMixture) {
   EXPECT_EQ(ml::predict(model, x).sigma_m, ml::predict(again.value(), x).sigma_m);
 }
 
-}  // namespace anchord::api
+}  // namespace anchord::api::model_artifact_test

@@ -5,7 +5,7 @@
 
 #include "api/learning/range_features.hpp"
 
-namespace anchord::api {
+namespace anchord::api::model_gate_test {
 namespace {
 
 using nlos::Feature;
@@ -98,4 +98,4 @@ TEST(ModelGate, FiguresOfDifferentRowsAreNotCompared) {
   EXPECT_FALSE(gate_of(correction(0.09, "a", 0.06), &older, {{}, true}).passed);
 }
 
-}  // namespace anchord::api
+}  // namespace anchord::api::model_gate_test

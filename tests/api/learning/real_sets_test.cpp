@@ -13,7 +13,7 @@
 #include "core/ml/learn.hpp"
 #include "tests/paths.hpp"
 
-namespace anchord::api {
+namespace anchord::api::real_sets_test {
 namespace {
 
 const std::filesystem::path k_data = ANCHORD_SHARED_DATA;
@@ -31,7 +31,7 @@ struct Case {
 
 void PrintTo(const Case& c, std::ostream* out) { *out << c.name; }
 
-class RealSet : public testing::TestWithParam<Case> {};
+class RealSet : public ::testing::TestWithParam<Case> {};
 
 TEST_P(RealSet, HoldsItsFigureOnPlacesItHasNotSeen) {
   const Case& c = GetParam();
@@ -94,7 +94,7 @@ TEST_P(RealSet, HoldsItsFigureOnPlacesItHasNotSeen) {
 using enum ml::Task;
 INSTANTIATE_TEST_SUITE_P(
     Public, RealSet,
-    testing::Values(
+    ::testing::Values(
         Case{"graz-rooms", "graz-rooms/rooms.csv.gz", {"room_to"}, 10, nlos_id, 0.860, 0.216, 0.855, 0.23},
         Case{"ghent-iiot", "ghent-iiot/iiot19.csv.gz", {"tag_pos"}, 10, nlos_id, 0.890, 0.071, 0.87, 0.08},
         Case{"warsaw-cir", "warsaw-cir/rangings.csv.gz", {"setup"}, 23, nlos_id, 0.885, 0.074, 0.88, 0.09},
@@ -166,4 +166,4 @@ INSTANTIATE_TEST_SUITE_P(
     });
 
 }  // namespace
-}  // namespace anchord::api
+}  // namespace anchord::api::real_sets_test

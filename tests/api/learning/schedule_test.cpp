@@ -1,7 +1,7 @@
 // A campaign against the measurement grid of the dissertation (4.2).
 #include "tests/api/app_fixture.hpp"
 
-namespace anchord::test {
+namespace anchord::test::schedule_test {
 namespace {
 
 class CampaignSchedule : public AppFixture {};
@@ -38,4 +38,4 @@ TEST_F(CampaignSchedule, SaysWhatOfTheGridOfADissertationsCampaignIsMissing) {
 }
 
 }  // namespace
-}  // namespace anchord::test
+}  // namespace anchord::test::schedule_test

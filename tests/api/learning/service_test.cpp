@@ -9,7 +9,7 @@
 #include "drivers/sim/flight.hpp"
 #include "tests/api/app_fixture.hpp"
 
-namespace anchord::test {
+namespace anchord::test::service_test {
 namespace {
 
 /// Six rooms of ten settings: a wall takes 6 dB of the first path and adds half a metre.
@@ -231,13 +231,13 @@ TEST_F(LearningService, OneOfEightPromotionsAndRollbacksOfOneStateIsMade) {
   const auto none = train("los_bias", "none");
   ASSERT_EQ(promote(none, R"({"reason":"something to go back to"})").status, 200);
   const auto promoted = together(run.value("model", "") + "/promote", R"({"reason":"now"})", "");
-  EXPECT_EQ(std::ranges::count(promoted, 200), 1) << testing::PrintToString(promoted);
+  EXPECT_EQ(std::ranges::count(promoted, 200), 1) << ::testing::PrintToString(promoted);
   for (const int one : promoted) EXPECT_TRUE(one == 200 || one == 409 || one == 422) << one;
   EXPECT_EQ(json(get("/api/v1/models/promotions"))["items"].size(), 2u);
   // Two presses of one button are one rollback where the client says what it saw.
   const auto seen = header(get("/api/v1/models/active"), "ETag");
   const auto back = together("/api/v1/models/rollback", R"({"task":"los_bias"})", seen);
-  EXPECT_EQ(std::ranges::count(back, 200), 1) << testing::PrintToString(back);
+  EXPECT_EQ(std::ranges::count(back, 200), 1) << ::testing::PrintToString(back);
   for (const int one : back) EXPECT_TRUE(one == 200 || one == 409 || one == 412) << one;
   EXPECT_EQ("/api/v1/models/" + json(get("/api/v1/models/active"))["models"]["los_bias"].value("id", ""),
             none["model"]);
@@ -578,4 +578,4 @@ TEST_F(LearningService, KeepsRolesApart) {
 }
 
 }  // namespace
-}  // namespace anchord::test
+}  // namespace anchord::test::service_test

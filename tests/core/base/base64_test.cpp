@@ -6,7 +6,7 @@
 #include <string_view>
 #include <utility>
 
-namespace anchord {
+namespace anchord::base64_test {
 namespace {
 
 // RFC 4648 section 10.
@@ -74,4 +74,4 @@ TEST(Base64, KnowsADigitFromAnyOtherByteAtEveryPlace) {
   }
 }
 
-}  // namespace anchord
+}  // namespace anchord::base64_test

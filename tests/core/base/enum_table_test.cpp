@@ -7,7 +7,7 @@
 
 #include "core/base/errc_words.hpp"
 
-namespace anchord {
+namespace anchord::enum_table_test {
 namespace {
 
 // Not in the order of the words, so that nothing is right by its position alone.
@@ -70,4 +70,4 @@ TEST(ErrcWords, NameEachCodeByItself) {
 }
 
 }  // namespace
-}  // namespace anchord
+}  // namespace anchord::enum_table_test

@@ -7,7 +7,7 @@
 
 #include "core/base/text.hpp"
 
-namespace anchord {
+namespace anchord::guard_test {
 namespace {
 
 using std::chrono::seconds;
@@ -88,4 +88,4 @@ TEST(GuardedTasks, AreKeptUpToABoundedNumberOfNames) {
 }
 
 }  // namespace
-}  // namespace anchord
+}  // namespace anchord::guard_test

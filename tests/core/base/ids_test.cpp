@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace anchord {
+namespace anchord::ids_test {
 namespace {
 
 TEST(Uuid, Version7SortsByTimeAndSurvivesTheRoundTrip) {
@@ -49,4 +49,4 @@ TEST(NetworkId, ReadsHexAndDecimalAndWritesFourHexDigits) {
 }
 
 }  // namespace
-}  // namespace anchord
+}  // namespace anchord::ids_test

@@ -13,7 +13,7 @@
 
 #include "core/base/guard.hpp"
 
-namespace anchord {
+namespace anchord::locked_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -178,4 +178,4 @@ TEST(Locked, BuildsItsValueInPlace) {
 }
 
 }  // namespace
-}  // namespace anchord
+}  // namespace anchord::locked_test

@@ -7,7 +7,7 @@
 #include <random>
 #include <vector>
 
-namespace anchord {
+namespace anchord::median_test {
 namespace {
 
 double by_sorting(std::vector<double> values) {
@@ -43,4 +43,4 @@ TEST(Median, IsTheMiddleOfTheSortedValuesHoweverManyAndInWhateverOrder) {
 }
 
 }  // namespace
-}  // namespace anchord
+}  // namespace anchord::median_test

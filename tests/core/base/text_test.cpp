@@ -8,7 +8,7 @@
 
 #include "core/base/to_wire.hpp"
 
-namespace anchord {
+namespace anchord::text_test {
 namespace {
 
 const std::string k_fffd = "\xef\xbf\xbd";
@@ -101,4 +101,4 @@ TEST(ToWire, ThrowsOnNoBytesAndWritesNoNumberThatIsNone) {
 }
 
 }  // namespace
-}  // namespace anchord
+}  // namespace anchord::text_test

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace anchord {
+namespace anchord::time_test {
 namespace {
 
 // 1777889472 is what `date -u -d 2026-05-04T10:11:12Z +%s` prints.
@@ -36,4 +36,4 @@ TEST(Rfc3339, WritesInstantsBeforeTheEpoch) {
 }
 
 }  // namespace
-}  // namespace anchord
+}  // namespace anchord::time_test

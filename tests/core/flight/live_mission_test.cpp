@@ -12,7 +12,7 @@
 #include "core/localize/flight_solver.hpp"
 #include "tests/core/localize/flight_support.hpp"
 
-namespace anchord {
+namespace anchord::live_mission_test {
 namespace {
 
 using flight::Event;
@@ -250,4 +250,4 @@ TEST(LiveMission, AJointSolutionOfBeforeItBeganAnewIsNotAdopted) {
 }
 
 }  // namespace
-}  // namespace anchord
+}  // namespace anchord::live_mission_test

@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-namespace anchord {
+namespace anchord::measured_time_test {
 namespace {
 
 constexpr double k_rover_ahead_s = 1.7e9;  // its clock and ours have nothing to do with each other
@@ -39,4 +39,4 @@ TEST(MeasuredTime, AClockThatIsPutForwardIsFollowedAtOnceAndNothingIsMeasuredInT
 }
 
 }  // namespace
-}  // namespace anchord
+}  // namespace anchord::measured_time_test

@@ -6,7 +6,7 @@
 
 #include <set>
 
-namespace anchord::flight {
+namespace anchord::flight::parameters_test {
 namespace {
 
 /// Of 0 to 7 those that are found good, everything else set as it should be.
@@ -43,4 +43,4 @@ TEST(FlightParameters, NoFailsafeThatStopsTheMotorsInTheAirIsFoundGood) {
 }
 
 }  // namespace
-}  // namespace anchord::flight
+}  // namespace anchord::flight::parameters_test

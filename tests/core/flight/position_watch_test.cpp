@@ -9,7 +9,7 @@
 #include "tests/core/localize/flight_support.hpp"
 #include "tests/core/localize/spoilt_track.hpp"
 
-namespace anchord {
+namespace anchord::position_watch_test {
 namespace {
 
 using flight::FixBelieved;
@@ -157,4 +157,4 @@ TEST(PositionWatch, FollowsTheAircraftThoughTheBaseMoved) {
 }
 
 }  // namespace
-}  // namespace anchord
+}  // namespace anchord::position_watch_test

@@ -10,7 +10,7 @@
 #include "core/floor_plan/trace.hpp"
 #include "tests/core/floor_plan/drawings.hpp"
 
-namespace anchord::floor_plan {
+namespace anchord::floor_plan::drawing_test {
 namespace {
 
 using Eigen::Vector2d;
@@ -177,4 +177,4 @@ TEST(DrawnPlan, WithoutSizeIsRefused) {
 }
 
 }  // namespace
-}  // namespace anchord::floor_plan
+}  // namespace anchord::floor_plan::drawing_test

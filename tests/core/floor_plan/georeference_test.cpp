@@ -5,7 +5,7 @@
 
 #include <numbers>
 
-namespace anchord::floor_plan {
+namespace anchord::floor_plan::georeference_test {
 namespace {
 
 /// 2 cm per pixel, turned by 30 degrees, its upper left corner at (100, -40) m.
@@ -136,4 +136,4 @@ TEST(PlanFit, RefusesPointsThatTellNothing) {
 }
 
 }  // namespace
-}  // namespace anchord::floor_plan
+}  // namespace anchord::floor_plan::georeference_test

@@ -11,7 +11,7 @@
 #include "core/floor_plan/image_head.hpp"
 #include "tests/core/floor_plan/pictures.hpp"
 
-namespace anchord::floor_plan {
+namespace anchord::floor_plan::image_test {
 namespace {
 
 std::span<const std::byte> image_bytes(const std::string& text) { return std::as_bytes(std::span(text)); }
@@ -210,4 +210,4 @@ TEST(PlanImage, IsHalvedUntilItsPngFits) {
 }
 
 }  // namespace
-}  // namespace anchord::floor_plan
+}  // namespace anchord::floor_plan::image_test

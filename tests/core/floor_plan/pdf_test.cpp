@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-namespace anchord::floor_plan {
+namespace anchord::floor_plan::pdf_test {
 namespace {
 
 constexpr std::string_view k_told =
@@ -69,4 +69,4 @@ TEST(Pdf, IsDrawnNoFinerThanAPlanMayBe) {
 }
 
 }  // namespace
-}  // namespace anchord::floor_plan
+}  // namespace anchord::floor_plan::pdf_test

@@ -11,7 +11,7 @@
 
 #include "core/floor_plan/image_head.hpp"
 
-namespace anchord::floor_plan {
+namespace anchord::floor_plan::tiles_test {
 namespace {
 
 constexpr double k_scale_m = 0.02;
@@ -155,4 +155,4 @@ TEST(PlanTilePyramid, RefusesAPlanOfFiveKilometres) {
 }
 
 }  // namespace
-}  // namespace anchord::floor_plan
+}  // namespace anchord::floor_plan::tiles_test

@@ -12,7 +12,7 @@
 #include <opencv2/imgproc.hpp>
 #include <random>
 
-namespace anchord::floor_plan {
+namespace anchord::floor_plan::trace_test {
 namespace {
 
 using Point = Eigen::Vector2d;
@@ -283,4 +283,4 @@ TEST(PlanTrace, EndsWhenItIsToldTo) {
 }
 
 }  // namespace
-}  // namespace anchord::floor_plan
+}  // namespace anchord::floor_plan::trace_test

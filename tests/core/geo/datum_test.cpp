@@ -6,7 +6,7 @@
 
 #include "core/geo/enu.hpp"
 
-namespace anchord {
+namespace anchord::datum_test {
 namespace {
 
 TEST(DatumChange, MatchesThePublishedExample) {
@@ -30,4 +30,4 @@ TEST(DatumChange, TakesOnePlaceToAnother) {
 }
 
 }  // namespace
-}  // namespace anchord
+}  // namespace anchord::datum_test

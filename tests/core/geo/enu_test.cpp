@@ -5,7 +5,7 @@
 #include <cmath>
 #include <numbers>
 
-namespace anchord {
+namespace anchord::enu_test {
 namespace {
 
 // Semi-axes of WGS84 (NIMA TR8350.2, table 3.1).
@@ -54,4 +54,4 @@ TEST(EnuFrame, TurnsACovarianceWithTheMeridians) {
 }
 
 }  // namespace
-}  // namespace anchord
+}  // namespace anchord::enu_test

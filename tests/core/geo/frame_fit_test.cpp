@@ -8,7 +8,7 @@
 #include <numbers>
 #include <random>
 
-namespace anchord {
+namespace anchord::frame_fit_test {
 namespace {
 
 using Eigen::Vector3d;
@@ -222,4 +222,4 @@ TEST(FrameFit, KeepsTheScaleWhenTold) {
 }
 
 }  // namespace
-}  // namespace anchord
+}  // namespace anchord::frame_fit_test

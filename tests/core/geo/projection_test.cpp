@@ -8,7 +8,7 @@
 
 #include "core/geo/geoid.hpp"
 
-namespace anchord {
+namespace anchord::projection_test {
 namespace {
 
 constexpr double degrees(double d, double m, double s) { return d + m / 60 + s / 3600; }
@@ -137,4 +137,4 @@ TEST(Geoid, ReadsTheHeightOfAnInstalledFile) {
 }
 
 }  // namespace
-}  // namespace anchord
+}  // namespace anchord::projection_test

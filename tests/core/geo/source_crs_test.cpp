@@ -8,7 +8,7 @@
 
 #include "core/geo/enu.hpp"
 
-namespace anchord {
+namespace anchord::source_crs_test {
 namespace {
 
 SourceCrs opened(const SourceCrsSpec& spec, const Eigen::Vector3d& first) {
@@ -126,4 +126,4 @@ TEST(SourceCrs, RefusesWhatIsNoSystemOfPositions) {
 }
 
 }  // namespace
-}  // namespace anchord
+}  // namespace anchord::source_crs_test

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <numbers>
 
-namespace anchord {
+namespace anchord::tag_track_test {
 namespace {
 
 Fix fix_at(double t_s, Eigen::Vector3d at, FixClass quality = FixClass::rtk_fixed,
@@ -113,4 +113,4 @@ TEST(TagTrack, FindsTheNeighboursOfEveryInstantHoweverUnevenTheTrackIs) {
   EXPECT_EQ(track.at(times_s.back() + 1e-6).refused, TrackRefusal::outside);
 }
 
-}  // namespace anchord
+}  // namespace anchord::tag_track_test

@@ -7,7 +7,7 @@
 
 #include "core/geo/enu.hpp"
 
-namespace anchord {
+namespace anchord::track_check_test {
 namespace {
 
 constexpr Wgs84 k_home{51.0231, 3.7131, 55.5};
@@ -158,4 +158,4 @@ TEST(TrackCheck, SurvivesNothingOneAndRubbish) {
 }
 
 }  // namespace
-}  // namespace anchord
+}  // namespace anchord::track_check_test

@@ -6,7 +6,7 @@
 #include "core/localize/flight_solver.hpp"
 #include "flight_support.hpp"
 
-namespace anchord {
+namespace anchord::antennas_test {
 namespace {
 
 using testing::MadeFlight;
@@ -79,4 +79,4 @@ TEST(Antennas, BeyondFourShareTheCommonArm) {
 }
 
 }  // namespace
-}  // namespace anchord
+}  // namespace anchord::antennas_test

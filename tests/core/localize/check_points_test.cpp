@@ -5,7 +5,7 @@
 
 #include <cmath>
 
-namespace anchord {
+namespace anchord::check_points_test {
 namespace {
 
 CheckPoint point(std::uint32_t id, double off_m, double solved_m = 0.04, double surveyed_m = 0.03) {
@@ -54,4 +54,4 @@ TEST(CheckPoints, WithoutUsableCovarianceAreLeftOut) {
 }
 
 }  // namespace
-}  // namespace anchord
+}  // namespace anchord::check_points_test

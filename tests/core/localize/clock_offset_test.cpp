@@ -10,7 +10,7 @@
 #include "core/localize/flight_solver.hpp"
 #include "tests/core/localize/flight_support.hpp"
 
-namespace anchord {
+namespace anchord::clock_offset_test {
 namespace {
 
 using testing::MadeFlight;
@@ -65,4 +65,4 @@ TEST(ClockOffset, IsNotFoundInLateRangesOrALagOfTenths) {
 }
 
 }  // namespace
-}  // namespace anchord
+}  // namespace anchord::clock_offset_test

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <vector>
 
-namespace anchord {
+namespace anchord::column_factor_test {
 namespace {
 
 /// Errors alike as far as the rows are near each other, and some of their own.
@@ -54,4 +54,4 @@ TEST(ColumnFactor, SaysOfAFitWhatEigenSays) {
 }
 
 }  // namespace
-}  // namespace anchord
+}  // namespace anchord::column_factor_test

@@ -10,7 +10,7 @@
 #include "core/localize/flight_solver.hpp"
 #include "flight_support.hpp"
 
-namespace anchord {
+namespace anchord::contradiction_test {
 namespace {
 
 constexpr double k_limit = 16.266;  // chi-square tables: 99.9 %, three degrees of freedom
@@ -139,4 +139,4 @@ TEST(Contradictions, OfAFlightInWhichOneMovedAndTwoWereExchanged) {
 }
 
 }  // namespace
-}  // namespace anchord
+}  // namespace anchord::contradiction_test

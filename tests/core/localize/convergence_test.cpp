@@ -8,7 +8,7 @@
 
 #include "tests/core/localize/flight_support.hpp"
 
-namespace anchord {
+namespace anchord::convergence_test {
 namespace {
 
 using testing::MadeFlight;
@@ -73,4 +73,4 @@ TEST(Convergence, LeavesOutIterationsThatBringNothingNew) {
 }
 
 }  // namespace
-}  // namespace anchord
+}  // namespace anchord::convergence_test

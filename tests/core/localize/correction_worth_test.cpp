@@ -8,7 +8,7 @@
 
 #include "flight_support.hpp"
 
-namespace anchord {
+namespace anchord::correction_worth_test {
 namespace {
 
 using testing::MadeFlight;
@@ -98,4 +98,4 @@ TEST(CorrectionWorth, HasTheClosedFormOfStudentsT) {
 }
 
 }  // namespace
-}  // namespace anchord
+}  // namespace anchord::correction_worth_test

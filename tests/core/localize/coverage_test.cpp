@@ -9,7 +9,7 @@
 #include "core/localize/flight_solver.hpp"
 #include "tests/core/localize/made_kits.hpp"
 
-namespace anchord {
+namespace anchord::coverage_test {
 namespace {
 
 using testing::KitFlight;
@@ -215,4 +215,4 @@ TEST(Coverage, DoesNotShrinkWhereRangesAreSpoilt) {
 }
 
 }  // namespace
-}  // namespace anchord
+}  // namespace anchord::coverage_test

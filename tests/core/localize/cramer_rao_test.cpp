@@ -6,7 +6,7 @@
 
 #include <cstdio>
 
-namespace anchord::testing {
+namespace anchord::testing::cramer_rao_test {
 namespace {
 
 constexpr int k_flights = 60;  // 480 anchors: coverage to 1 %
@@ -32,4 +32,4 @@ TEST(CramerRao, IsNotFarWithoutAnyModelOfBlockedRanges) {
 }
 
 }  // namespace
-}  // namespace anchord::testing
+}  // namespace anchord::testing::cramer_rao_test

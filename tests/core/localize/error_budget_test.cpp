@@ -9,7 +9,7 @@
 #include "core/localize/flight_solver.hpp"
 #include "flight_support.hpp"
 
-namespace anchord {
+namespace anchord::error_budget_test {
 namespace {
 
 using testing::MadeFlight;
@@ -219,4 +219,4 @@ TEST(ErrorBudget, NamesTheFloor) {
 }
 
 }  // namespace
-}  // namespace anchord
+}  // namespace anchord::error_budget_test

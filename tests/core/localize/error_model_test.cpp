@@ -7,7 +7,7 @@
 #include "core/localize/flight_solver.hpp"
 #include "tests/core/localize/flight_support.hpp"
 
-namespace anchord {
+namespace anchord::error_model_test {
 namespace {
 
 RangeErrorModel half() {
@@ -113,4 +113,4 @@ TEST(ErrorModelLikelihood, IsClaimedForLessWhereErrorsAreTwiceWhatItPromises) {
 }
 
 }  // namespace
-}  // namespace anchord
+}  // namespace anchord::error_model_test

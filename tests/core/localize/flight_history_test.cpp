@@ -4,7 +4,7 @@
 
 #include "core/localize/accuracy_goal.hpp"
 
-namespace anchord {
+namespace anchord::flight_history_test {
 namespace {
 
 TEST(FlightHistory, StaysWithinItsBoundAndKeepsOldAndNewAlike) {
@@ -138,4 +138,4 @@ TEST(AccuracyGoal, IsNotReachedWithoutAPositionOrWithAnotherVerdict) {
 }
 
 }  // namespace
-}  // namespace anchord
+}  // namespace anchord::flight_history_test

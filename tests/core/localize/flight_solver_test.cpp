@@ -9,7 +9,7 @@
 
 #include "tests/core/localize/flight_support.hpp"
 
-namespace anchord {
+namespace anchord::flight_solver_test {
 namespace {
 
 using testing::MadeFlight;
@@ -265,4 +265,4 @@ TEST(FlightSolver, HoldsTheHeightInTwoDimensions) {
 }
 
 }  // namespace
-}  // namespace anchord
+}  // namespace anchord::flight_solver_test

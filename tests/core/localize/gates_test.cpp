@@ -8,7 +8,7 @@
 #include "core/localize/fuse.hpp"
 #include "tests/core/localize/flight_support.hpp"
 
-namespace anchord {
+namespace anchord::gates_test {
 namespace {
 
 using testing::MadeFlight;
@@ -239,4 +239,4 @@ TEST(Residuals, ListEveryPlacedRangeAndMarkTheRejected) {
 }
 
 }  // namespace
-}  // namespace anchord
+}  // namespace anchord::gates_test

@@ -7,7 +7,7 @@
 #include "core/localize/error_ellipse.hpp"
 #include "tests/core/localize/support.hpp"
 
-namespace anchord {
+namespace anchord::geometry_test {
 namespace {
 
 const Eigen::Vector3d k_anchor(3, 8, 2);
@@ -74,4 +74,4 @@ TEST(ErrorEllipse, TurnsClockwiseFromNorth) {
 }
 
 }  // namespace
-}  // namespace anchord
+}  // namespace anchord::geometry_test

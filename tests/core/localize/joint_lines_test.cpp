@@ -7,7 +7,7 @@
 
 #include "core/localize/residual.hpp"
 
-namespace anchord {
+namespace anchord::joint_lines_test {
 namespace {
 
 /// 30 s with a gap, a position that is not good enough, and an attitude on request; the spread of a position
@@ -182,4 +182,4 @@ TEST(JointLines, SayWhatAllRowsHaveInCommon) {
 }
 
 }  // namespace
-}  // namespace anchord
+}  // namespace anchord::joint_lines_test

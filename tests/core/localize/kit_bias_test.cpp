@@ -8,7 +8,7 @@
 #include "core/localize/kit_prior.hpp"
 #include "tests/core/localize/made_kits.hpp"
 
-namespace anchord {
+namespace anchord::kit_bias_test {
 namespace {
 
 using testing::KitFlight;
@@ -129,4 +129,4 @@ TEST(KitBias, IsHeldByTheIntervalOfTheProfileAndItsAnchorsByTheirRegions) {
 }
 
 }  // namespace
-}  // namespace anchord
+}  // namespace anchord::kit_bias_test

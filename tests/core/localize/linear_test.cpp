@@ -6,7 +6,7 @@
 
 #include "tests/core/localize/support.hpp"
 
-namespace anchord {
+namespace anchord::linear_test {
 namespace {
 
 Observation at(double x, double y, double z, const Eigen::Vector3d& anchor) {
@@ -83,4 +83,4 @@ TEST(StartCandidates, HoldBothSidesOfAFlatTrack) {
 }
 
 }  // namespace
-}  // namespace anchord
+}  // namespace anchord::linear_test

@@ -7,7 +7,7 @@
 #include "core/localize/flight_solver.hpp"
 #include "tests/core/localize/flight_support.hpp"
 
-namespace anchord {
+namespace anchord::live_flight_test {
 namespace {
 
 using testing::MadeFlight;
@@ -373,4 +373,4 @@ TEST(LiveFlight, TellsWhatStillWaitsAtItsEndAndUsesItWhenTheFixComesAfterAll) {
 }
 
 }  // namespace
-}  // namespace anchord
+}  // namespace anchord::live_flight_test

@@ -7,7 +7,7 @@
 
 #include "flight_support.hpp"
 
-namespace anchord {
+namespace anchord::method_comparison_test {
 namespace {
 
 using testing::MadeFlight;
@@ -88,4 +88,4 @@ TEST(Methods, TellWhyTheyHaveNoAnswer) {
 }
 
 }  // namespace
-}  // namespace anchord
+}  // namespace anchord::method_comparison_test

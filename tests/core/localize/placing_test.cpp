@@ -10,7 +10,7 @@
 #include "core/localize/flight_solver.hpp"
 #include "tests/core/localize/flight_support.hpp"
 
-namespace anchord {
+namespace anchord::placing_test {
 namespace {
 
 using testing::MadeFlight;
@@ -219,4 +219,4 @@ TEST(KitProfile, CountsAFlightGivenTwiceOnceAndKeepsANamesake) {
 }
 
 }  // namespace
-}  // namespace anchord
+}  // namespace anchord::placing_test

@@ -8,7 +8,7 @@
 #include "core/localize/flight_solver.hpp"
 #include "tests/core/localize/flight_support.hpp"
 
-namespace anchord {
+namespace anchord::prior_conflict_test {
 namespace {
 
 bool says(const std::string& text, const char* words) { return text.find(words) != std::string::npos; }
@@ -47,4 +47,4 @@ TEST(PriorConflict, IsTheReasonOfAnEstimateThatIsOtherwiseGood) {
 }
 
 }  // namespace
-}  // namespace anchord
+}  // namespace anchord::prior_conflict_test

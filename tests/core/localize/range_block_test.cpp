@@ -6,7 +6,7 @@
 #include <Eigen/Dense>
 #include <random>
 
-namespace anchord {
+namespace anchord::range_block_test {
 namespace {
 
 using Random = std::mt19937_64;
@@ -141,4 +141,4 @@ TEST(RangeBlock, TakesARangeOfNoDistanceAndOneFarOff) {
 }
 
 }  // namespace
-}  // namespace anchord
+}  // namespace anchord::range_block_test

@@ -9,7 +9,7 @@
 #include "tests/core/localize/real_flights.hpp"
 #include "tests/paths.hpp"
 
-namespace anchord {
+namespace anchord::real_flights_spoilt_test {
 namespace {
 
 using testing::AnchorError;
@@ -210,4 +210,4 @@ TEST(SpoiltRealFlights, AreNotClaimedBetterThanClean) {
 }
 
 }  // namespace
-}  // namespace anchord
+}  // namespace anchord::real_flights_spoilt_test

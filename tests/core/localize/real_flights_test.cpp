@@ -16,7 +16,7 @@
 #include "api/formats/flight_json.hpp"
 #include "tests/paths.hpp"
 
-namespace anchord {
+namespace anchord::real_flights_test {
 namespace {
 
 using namespace testing;
@@ -283,4 +283,4 @@ TEST_F(RealFlights, OfAWalkWithOnePositionASecondStayInsideTheirClaim) {
 }
 
 }  // namespace
-}  // namespace anchord
+}  // namespace anchord::real_flights_test

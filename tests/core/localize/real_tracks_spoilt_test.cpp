@@ -12,7 +12,7 @@
 #include "tests/core/localize/spoilt_track.hpp"
 #include "tests/paths.hpp"
 
-namespace anchord {
+namespace anchord::real_tracks_spoilt_test {
 namespace {
 
 struct RealFlight {
@@ -99,4 +99,4 @@ INSTANTIATE_TEST_SUITE_P(OfEachSet, RealTracks,
                          [](const auto& made) { return std::string(made.param.flight); });
 
 }  // namespace
-}  // namespace anchord
+}  // namespace anchord::real_tracks_spoilt_test

@@ -8,7 +8,7 @@
 #include "core/localize/flight_solver.hpp"
 #include "tests/core/localize/flight_support.hpp"
 
-namespace anchord {
+namespace anchord::recovery_test {
 namespace {
 
 using testing::MadeFlight;
@@ -130,4 +130,4 @@ TEST(AnchorToAnchor, RangesTightenAWeakFlightInTheSameSolve) {
 }
 
 }  // namespace
-}  // namespace anchord
+}  // namespace anchord::recovery_test

@@ -11,7 +11,7 @@
 #include "core/localize/solver.hpp"
 #include "core/planning/next_point.hpp"
 
-namespace anchord {
+namespace anchord::reenactment_test {
 namespace {
 
 constexpr int k_iterations = 20, k_ranges_each = 10, k_seeds = 200;
@@ -103,4 +103,4 @@ TEST(Reenactment, OfFigure811EndsWithinNineCentimetresWithoutLineOfSight) {
 }
 
 }  // namespace
-}  // namespace anchord
+}  // namespace anchord::reenactment_test

@@ -10,7 +10,7 @@
 #include "core/localize/flight_solver.hpp"
 #include "flight_support.hpp"
 
-namespace anchord {
+namespace anchord::region_reason_test {
 namespace {
 
 using testing::MadeFlight;
@@ -112,4 +112,4 @@ TEST(RegionReason, IsThatOfTheLastBudget) {
 }
 
 }  // namespace
-}  // namespace anchord
+}  // namespace anchord::region_reason_test

@@ -7,7 +7,7 @@
 #include <random>
 #include <tuple>
 
-namespace anchord {
+namespace anchord::seen_exchanges_test {
 namespace {
 
 Range exchange(std::int64_t ns, std::uint32_t tag, std::uint8_t antenna, std::uint32_t anchor) {
@@ -70,4 +70,4 @@ TEST(SeenExchanges, RememberAsManyAsTheyMayOfALongUpload) {
 }
 
 }  // namespace
-}  // namespace anchord
+}  // namespace anchord::seen_exchanges_test

@@ -10,7 +10,7 @@
 #include "core/localize/turn.hpp"
 #include "tests/core/localize/flight_support.hpp"
 
-namespace anchord {
+namespace anchord::side_test {
 namespace {
 
 const NetworkId k_id{0x6001};
@@ -140,4 +140,4 @@ TEST(AllRound, TheRangesOverruleAHeightSearchThatIsMetresOff) {
 }
 
 }  // namespace
-}  // namespace anchord
+}  // namespace anchord::side_test

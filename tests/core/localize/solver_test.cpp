@@ -10,7 +10,7 @@
 #include "core/localize/residual.hpp"
 #include "tests/core/localize/support.hpp"
 
-namespace anchord {
+namespace anchord::solver_test {
 namespace {
 
 const std::vector<Method> k_methods{Method::gauss_newton, Method::levenberg_marquardt, Method::dogleg};
@@ -249,4 +249,4 @@ TEST(AnchorSolver, ToleratesStartingOnATagPosition) {
 }
 
 }  // namespace
-}  // namespace anchord
+}  // namespace anchord::solver_test

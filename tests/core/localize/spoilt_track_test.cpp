@@ -13,7 +13,7 @@
 #include "tests/core/localize/flight_support.hpp"
 #include "tests/core/localize/spoilt_track.hpp"
 
-namespace anchord {
+namespace anchord::spoilt_track_test {
 namespace {
 
 using testing::MadeFlight;
@@ -117,4 +117,4 @@ TEST(SpoiltTrackLive, CountsPositionsOfABaseThatMoved) {
 }
 
 }  // namespace
-}  // namespace anchord
+}  // namespace anchord::spoilt_track_test

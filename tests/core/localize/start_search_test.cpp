@@ -11,7 +11,7 @@
 #include "core/localize/solver.hpp"
 #include "tests/core/localize/flight_support.hpp"
 
-namespace anchord {
+namespace anchord::start_search_test {
 namespace {
 
 using testing::MadeFlight;
@@ -98,4 +98,4 @@ TEST(StartSearch, ReportsHowManyStartsEndedWhere) {
 }
 
 }  // namespace
-}  // namespace anchord
+}  // namespace anchord::start_search_test

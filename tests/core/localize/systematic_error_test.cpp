@@ -11,7 +11,7 @@
 #include "core/localize/flight_solver.hpp"
 #include "tests/core/localize/flight_support.hpp"
 
-namespace anchord {
+namespace anchord::systematic_error_test {
 namespace {
 
 using testing::MadeFlight;
@@ -217,4 +217,4 @@ TEST(SystematicErrors, TakesNoSlopeOfNearRangesForAFactor) {
 }
 
 }  // namespace
-}  // namespace anchord
+}  // namespace anchord::systematic_error_test

@@ -10,7 +10,7 @@
 #include "core/localize/flight_solver.hpp"
 #include "tests/core/localize/flight_support.hpp"
 
-namespace anchord {
+namespace anchord::track_shift_test {
 namespace {
 
 using testing::MadeFlight;
@@ -138,4 +138,4 @@ TEST(TrackShift, IsInTheRegionWhereTheRangesCannotShowIt) {
 }
 
 }  // namespace
-}  // namespace anchord
+}  // namespace anchord::track_shift_test

@@ -14,7 +14,7 @@
 #include "core/localize/flight_solver.hpp"
 #include "tests/core/localize/flight_support.hpp"
 
-namespace anchord {
+namespace anchord::unseen_arm_test {
 namespace {
 
 using testing::MadeFlight;
@@ -351,4 +351,4 @@ TEST(UnseenArm, RefusesASigmaThatIsNone) {
 }
 
 }  // namespace
-}  // namespace anchord
+}  // namespace anchord::unseen_arm_test

@@ -15,7 +15,7 @@
 #include "core/localize/live_anchor.hpp"
 #include "tests/core/localize/support.hpp"
 
-namespace anchord {
+namespace anchord::warm_solve_test {
 namespace {
 
 SolverOptions robust() {
@@ -139,4 +139,4 @@ TEST(LiveAnchorRefinement, IsThreeStepsOfReweightedLeastSquares) {
 }
 
 }  // namespace
-}  // namespace anchord
+}  // namespace anchord::warm_solve_test

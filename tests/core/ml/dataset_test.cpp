@@ -7,7 +7,7 @@
 
 #include "core/base/sha256.hpp"
 
-namespace anchord::ml {
+namespace anchord::ml::dataset_test {
 namespace {
 
 Dataset small() {
@@ -117,4 +117,4 @@ TEST(Dataset, WithoutAnyTruthSigmaEveryRowWeighsOne) {
   EXPECT_EQ(data.digest(), digest);
 }
 
-}  // namespace anchord::ml
+}  // namespace anchord::ml::dataset_test

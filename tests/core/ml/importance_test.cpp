@@ -4,7 +4,7 @@
 
 #include "core/ml/random.hpp"
 
-namespace anchord::ml {
+namespace anchord::ml::importance_test {
 namespace {
 
 // The class hangs on "strong", a little on "weak", and not at all on "noise".
@@ -60,4 +60,4 @@ TEST(ForwardFilter, RefusesAFeatureThatIsNotThere) {
   EXPECT_FALSE(forward_filter(data, forest(), {"absent"}, grouped_folds(data.group, 6, 1), true));
 }
 
-}  // namespace anchord::ml
+}  // namespace anchord::ml::importance_test

@@ -5,7 +5,7 @@
 #include "core/ml/evaluate.hpp"
 #include "tests/core/ml/learning_world.hpp"
 
-namespace anchord::ml {
+namespace anchord::ml::learn_test {
 namespace {
 
 Dataset world(std::uint64_t seed, bool with_truth) { return learning_world(seed, with_truth); }
@@ -104,4 +104,4 @@ TEST(Learn, ACapNeverRaisesTheFalsePositiveRate) {
   }
 }
 
-}  // namespace anchord::ml
+}  // namespace anchord::ml::learn_test

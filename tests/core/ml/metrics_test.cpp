@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace anchord::ml {
+namespace anchord::ml::metrics_test {
 
 // Ten links by hand: 5 LOS of which 4 right, 5 NLOS of which 3 right.
 TEST(Confusion, RatesByHand) {
@@ -58,4 +58,4 @@ TEST(Cdf, RunsOverMagnitudesFromLeastToMost) {
   EXPECT_EQ(curve[2].value_m, 3);
 }
 
-}  // namespace anchord::ml
+}  // namespace anchord::ml::metrics_test

@@ -7,7 +7,7 @@
 #include "core/ml/random.hpp"
 #include "core/ml/train.hpp"
 
-namespace anchord::ml {
+namespace anchord::ml::mixture_test {
 
 // erfcx(1) = 0.427583576155807..., erfcx(10) = 0.0561409927438226 (Abramowitz and Stegun 7.1; asymptotic
 // series).
@@ -68,4 +68,4 @@ TEST(BiasMixture, RefusesASingleClass) {
   EXPECT_EQ(fit_mixture({x, 1, bias, w, p, los, {}, {}, 0}).error().code, Errc::too_few_observations);
 }
 
-}  // namespace anchord::ml
+}  // namespace anchord::ml::mixture_test

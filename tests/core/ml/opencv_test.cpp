@@ -10,7 +10,7 @@
 #include "core/ml/train_opencv.hpp"
 #include "learning_world.hpp"
 
-namespace anchord::ml {
+namespace anchord::ml::opencv_test {
 namespace {
 
 /// Two clouds that overlap, or a curved surface; values that floats hold exactly.
@@ -156,4 +156,4 @@ TEST(OpenCv, RefusesWhatCannotBeLearned) {
 }
 
 }  // namespace
-}  // namespace anchord::ml
+}  // namespace anchord::ml::opencv_test

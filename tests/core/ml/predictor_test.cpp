@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-namespace anchord::ml {
+namespace anchord::ml::predictor_test {
 namespace {
 
 using nlos::Feature;
@@ -120,4 +120,4 @@ TEST(Predictor, MarksSamplesOutsideTheTrainingRows) {
   EXPECT_TRUE(made.value().predict(sample(3.1)).outside_training);
 }
 
-}  // namespace anchord::ml
+}  // namespace anchord::ml::predictor_test

@@ -6,7 +6,7 @@
 
 #include "core/ml/random.hpp"
 
-namespace anchord::ml {
+namespace anchord::ml::train_test {
 namespace {
 
 struct Sample {
@@ -162,4 +162,4 @@ TEST(Svm, LearnsARingWithRbfAndALineWithTheLinearKernel) {
   EXPECT_FALSE(fit_svm(one_class.rows(), {}, true));
 }
 
-}  // namespace anchord::ml
+}  // namespace anchord::ml::train_test

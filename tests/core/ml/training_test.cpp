@@ -8,7 +8,7 @@
 
 #include "tests/core/ml/learning_world.hpp"
 
-namespace anchord::ml {
+namespace anchord::ml::training_test {
 namespace {
 
 using std::chrono::steady_clock;
@@ -205,4 +205,4 @@ TEST(Training, NamesEveryFaultOfASpec) {
   EXPECT_NE(checked.error().message.find("logistic has no setting gamma"), std::string::npos);
 }
 
-}  // namespace anchord::ml
+}  // namespace anchord::ml::training_test

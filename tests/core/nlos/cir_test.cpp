@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-namespace anchord::nlos {
+namespace anchord::nlos::cir_test {
 namespace {
 
 // One nanosecond a tap, no noise taps, a window of 100 taps from the first path on: delays come out in taps.
@@ -250,4 +250,4 @@ TEST(CirShape, HasNoValueWithoutSignalOrWithAnImpossibleFirstPath) {
   EXPECT_FALSE(cir_shape(std::vector<float>(1016, 5.0F), std::nan("")));
 }
 
-}  // namespace anchord::nlos
+}  // namespace anchord::nlos::cir_test

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 
-namespace anchord::nlos {
+namespace anchord::nlos::features_test {
 
 // First row of the graz-rooms set; numbers with a pocket calculator.
 TEST(Features, OfAMeasuredRowMatchHandNumbers) {
@@ -99,4 +99,4 @@ TEST(RangeSpread, SlidesAndDropsZeroRanges) {
   EXPECT_NEAR(*window.sd_m(), 1, 1e-12);
 }
 
-}  // namespace anchord::nlos
+}  // namespace anchord::nlos::features_test

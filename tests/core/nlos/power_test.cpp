@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace anchord::nlos {
+namespace anchord::nlos::power_test {
 
 // C, N, F of a worked example in the register description: levels to four decimals by hand.
 TEST(FirstPathPower, MatchesTheWorkedExampleAtBothPrfs) {
@@ -37,4 +37,4 @@ TEST(StraightenedLevel, LeavesWeakLevelsAndRaisesStrongOnes) {
   EXPECT_NEAR(straightened_dbm(-80, Prf::mhz64), -80 + 8 * 1.1667, 1e-12);
 }
 
-}  // namespace anchord::nlos
+}  // namespace anchord::nlos::power_test

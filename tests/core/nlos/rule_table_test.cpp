@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace anchord::nlos {
+namespace anchord::nlos::rule_table_test {
 namespace {
 
 // Rows of table 5.1: right decisions of the printed RSS line.
@@ -81,4 +81,4 @@ TEST(RuleTable, FittedRulesAreJudgedOnPlacesTheyHaveNotSeen) {
   EXPECT_FALSE(row[static_cast<std::size_t>(Rule::range_sd)].judged());
 }
 
-}  // namespace anchord::nlos
+}  // namespace anchord::nlos::rule_table_test

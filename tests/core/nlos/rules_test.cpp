@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace anchord::nlos {
+namespace anchord::nlos::rules_test {
 
 // eq 5.1 at 5 m: -80.3977 - 4.2354 = -84.6331 dBm.
 TEST(RssRule, ThresholdIsThatOfEquation51) {
@@ -70,4 +70,4 @@ TEST(RuleRates, CountEachClassOnItsOwn) {
   EXPECT_EQ(rates.nlos_rate(), 1);
 }
 
-}  // namespace anchord::nlos
+}  // namespace anchord::nlos::rules_test

@@ -4,7 +4,7 @@
 
 #include <limits>
 
-namespace anchord::planning {
+namespace anchord::planning::bounds_test {
 namespace {
 
 using Eigen::Vector2d;
@@ -101,4 +101,4 @@ TEST(Bounds, WallsInARowMultiplyTheChanceOfASight) {
 }
 
 }  // namespace
-}  // namespace anchord::planning
+}  // namespace anchord::planning::bounds_test

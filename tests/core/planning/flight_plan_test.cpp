@@ -9,7 +9,7 @@
 
 #include "core/planning/design.hpp"
 
-namespace anchord::planning {
+namespace anchord::planning::flight_plan_test {
 namespace {
 
 using Eigen::Vector3d;
@@ -201,4 +201,4 @@ TEST(FlightPlan, LeavesOutWhatIsOutOfRangeFromEverywhere) {
 }
 
 }  // namespace
-}  // namespace anchord::planning
+}  // namespace anchord::planning::flight_plan_test

@@ -9,7 +9,7 @@
 #include <random>
 #include <vector>
 
-namespace anchord::planning {
+namespace anchord::planning::gdop_test {
 namespace {
 
 using Eigen::Vector2d;
@@ -177,4 +177,4 @@ TEST(GdopBatch, FlatVersionAgreesWithOneByOne) {
 }
 
 }  // namespace
-}  // namespace anchord::planning
+}  // namespace anchord::planning::gdop_test

@@ -11,7 +11,7 @@
 
 #include "core/planning/information.hpp"
 
-namespace anchord::planning {
+namespace anchord::planning::next_point_test {
 namespace {
 
 using Eigen::Vector3d;
@@ -352,4 +352,4 @@ TEST(Information, AgreesWithRebuildingAndInvertingInTwoThousandRandomCases) {
 }
 
 }  // namespace
-}  // namespace anchord::planning
+}  // namespace anchord::planning::next_point_test

@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-namespace anchord::planning {
+namespace anchord::planning::plan_change_test {
 namespace {
 
 /// On the equator, where a degree of either way is as long: metres east.
@@ -102,4 +102,4 @@ TEST(PlanChange, NamesTheAnchorsWhoseTargetDiffers) {
 }
 
 }  // namespace
-}  // namespace anchord::planning
+}  // namespace anchord::planning::plan_change_test

@@ -12,7 +12,7 @@
 #include "core/planning/local_plan.hpp"
 #include "core/planning/next_point.hpp"
 
-namespace anchord::planning {
+namespace anchord::planning::walls_test {
 namespace {
 
 using Eigen::Vector3d;
@@ -274,4 +274,4 @@ TEST(PlanOrigin, IsInTheMiddleOfAPlanOverTheDateLine) {
 }
 
 }  // namespace
-}  // namespace anchord::planning
+}  // namespace anchord::planning::walls_test

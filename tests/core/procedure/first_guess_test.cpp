@@ -6,7 +6,7 @@
 #include <numbers>
 #include <vector>
 
-namespace anchord {
+namespace anchord::first_guess_test {
 namespace {
 
 using Eigen::Vector3d;
@@ -52,4 +52,4 @@ TEST(FirstGuess, TakesASecondRangeToMendTheBearing) {
 }
 
 }  // namespace
-}  // namespace anchord
+}  // namespace anchord::first_guess_test

@@ -12,7 +12,7 @@
 
 #include "core/localize/accuracy_goal.hpp"
 
-namespace anchord::procedure {
+namespace anchord::procedure::flight_engine_test {
 namespace {
 
 using Eigen::Vector3d;
@@ -572,4 +572,4 @@ TEST(FlightEngine, ATurnThatSeesNoLobeIsFollowedByNoHeightSearchUntilItIsNearer)
 }
 
 }  // namespace
-}  // namespace anchord::procedure
+}  // namespace anchord::procedure::flight_engine_test

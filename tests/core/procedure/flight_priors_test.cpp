@@ -10,7 +10,7 @@
 
 #include "core/localize/live_flight.hpp"
 
-namespace anchord::procedure {
+namespace anchord::procedure::flight_priors_test {
 namespace {
 
 constexpr NetworkId k_prior_anchor{0x6a21}, k_other{0x6a22};
@@ -125,4 +125,4 @@ TEST(LiveMirrors, StandBothWhenTheBearingIsWeak) {
 }
 
 }  // namespace
-}  // namespace anchord::procedure
+}  // namespace anchord::procedure::flight_priors_test

@@ -10,7 +10,7 @@
 #include <set>
 #include <sstream>
 
-namespace anchord::procedure {
+namespace anchord::procedure::machine_test {
 namespace {
 
 std::vector<std::string> cells_of(const std::string& line) {
@@ -334,4 +334,4 @@ TEST(ProcedureMachine, SettingsWithoutAWaypointAreRefused) {
 }
 
 }  // namespace
-}  // namespace anchord::procedure
+}  // namespace anchord::procedure::machine_test

@@ -11,7 +11,7 @@
 #include "core/procedure/exit_rule.hpp"
 #include "core/procedure/height_search.hpp"
 
-namespace anchord::procedure {
+namespace anchord::procedure::priors_test {
 namespace {
 
 double apart_deg(double a_rad, double b_rad) {
@@ -136,4 +136,4 @@ TEST(ExitRule, EndsByGoalLimitOrBatteryWithTheReason) {
 }
 
 }  // namespace
-}  // namespace anchord::procedure
+}  // namespace anchord::procedure::priors_test

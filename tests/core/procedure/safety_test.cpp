@@ -8,7 +8,7 @@
 #include "core/planning/route.hpp"
 #include "core/procedure/flight_engine.hpp"
 
-namespace anchord::procedure {
+namespace anchord::procedure::safety_test {
 namespace {
 
 using Eigen::Vector2d;
@@ -279,4 +279,4 @@ TEST(Route, SaysWhenThereIsNoWay) {
 }
 
 }  // namespace
-}  // namespace anchord::procedure
+}  // namespace anchord::procedure::safety_test

@@ -5,7 +5,7 @@
 
 #include <vector>
 
-namespace anchord::procedure {
+namespace anchord::procedure::why_not_done_test {
 namespace {
 
 using Eigen::Vector3d;
@@ -54,4 +54,4 @@ TEST(WhyNotDone, NamesTheFirstCauseWithItsNumbers) {
 }
 
 }  // namespace
-}  // namespace anchord::procedure
+}  // namespace anchord::procedure::why_not_done_test

@@ -16,7 +16,7 @@
 
 // The whole of it on real ptys and sockets; the test plays the device and its cable.
 
-namespace anchord::device {
+namespace anchord::device::device_loop_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -295,4 +295,4 @@ TEST(DeviceLoop, AnswersCommandsAndSaysWhenNothingIsConnected) {
 }
 
 }  // namespace
-}  // namespace anchord::device
+}  // namespace anchord::device::device_loop_test

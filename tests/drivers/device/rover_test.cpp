@@ -6,7 +6,7 @@
 #include "collect.hpp"
 #include "drivers/device/settings.hpp"
 
-namespace anchord::gnss {
+namespace anchord::gnss::rover_test {
 namespace {
 
 using device::test::Collect;
@@ -157,4 +157,4 @@ TEST(Rover, RefusesOptionsItDoesNotKnow) {
 }
 
 }  // namespace
-}  // namespace anchord::gnss
+}  // namespace anchord::gnss::rover_test

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace anchord::device {
+namespace anchord::device::supervisor_test {
 namespace {
 
 constexpr std::int64_t k_ms = 1'000'000, k_s = 1'000'000'000;
@@ -118,4 +118,4 @@ TEST(Supervisor, LateReportsOfADeadLinkChangeNothing) {
 }
 
 }  // namespace
-}  // namespace anchord::device
+}  // namespace anchord::device::supervisor_test

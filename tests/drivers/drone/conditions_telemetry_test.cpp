@@ -1,7 +1,7 @@
 // What telemetry and positions say, and what follows from it, in ArduPilot's and in PX4's dialect.
 #include "conditions.hpp"
 
-namespace anchord::test {
+namespace anchord::test::conditions_telemetry_test {
 namespace {
 
 class TelemetryConditions : public Conditions {};
@@ -65,4 +65,4 @@ TEST_P(TelemetryConditions, DisarmIsSentWhateverTheServerBelievesAndNeverByForce
 }
 
 }  // namespace
-}  // namespace anchord::test
+}  // namespace anchord::test::conditions_telemetry_test

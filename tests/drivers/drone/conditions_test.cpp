@@ -2,7 +2,7 @@
 // the simulated autopilot, faster than real time.
 #include "conditions.hpp"
 
-namespace anchord::test {
+namespace anchord::test::conditions_test {
 namespace {
 
 INSTANTIATE_TEST_SUITE_P(Dialects, Conditions, ::testing::Values(Autopilot::ardupilot, Autopilot::px4),
@@ -514,4 +514,4 @@ TEST_P(Conditions, FliesAWholePlanOnAPoorLink) {
 }
 
 }  // namespace
-}  // namespace anchord::test
+}  // namespace anchord::test::conditions_test

@@ -10,7 +10,7 @@
 #include "air_rig.hpp"
 #include "core/planning/bounds.hpp"
 
-namespace anchord::test {
+namespace anchord::test::histories_test {
 namespace {
 
 using drone::Autopilot;
@@ -293,4 +293,4 @@ TEST(FlightHistories, NoneBreaksWhatMustHold) {
 }
 
 }  // namespace
-}  // namespace anchord::test
+}  // namespace anchord::test::histories_test

@@ -10,7 +10,7 @@
 
 #include "drivers/drone/signing_key.hpp"
 
-namespace anchord::drone {
+namespace anchord::drone::peer_gate_test {
 namespace {
 
 using mavlink::Address;
@@ -168,4 +168,4 @@ TEST(SigningKey, IsHexadecimalOrRawAndItsFileIsTheOwnersAlone) {
 }
 
 }  // namespace
-}  // namespace anchord::drone
+}  // namespace anchord::drone::peer_gate_test

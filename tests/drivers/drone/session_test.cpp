@@ -8,7 +8,7 @@
 
 #include "drivers/sim/autopilot.hpp"
 
-namespace anchord::drone {
+namespace anchord::drone::session_test {
 namespace {
 
 constexpr std::int64_t k_unix_us = 1'777'888'800'000'000;
@@ -326,4 +326,4 @@ TEST(DroneSession, SignedLinksRefuseUnsignedStations) {
 
 void PrintTo(CommandState state, std::ostream* out) { *out << static_cast<int>(state); }
 
-}  // namespace anchord::drone
+}  // namespace anchord::drone::session_test

@@ -6,7 +6,7 @@
 
 #include "core/base/ids.hpp"
 
-namespace anchord::dwm1001 {
+namespace anchord::dwm1001::protocol_test {
 namespace {
 
 using namespace std::string_literals;
@@ -118,4 +118,4 @@ TEST(DwmBinary, IsRefusedAnAnchorOrNoAnswerAtAll) {
 }
 
 }  // namespace
-}  // namespace anchord::dwm1001
+}  // namespace anchord::dwm1001::protocol_test

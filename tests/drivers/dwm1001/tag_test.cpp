@@ -8,7 +8,7 @@
 #include "drivers/sim/dwm1001.hpp"
 #include "tests/drivers/device/collect.hpp"
 
-namespace anchord::dwm1001 {
+namespace anchord::dwm1001::tag_test {
 namespace {
 
 using device::test::Collect;
@@ -176,4 +176,4 @@ TEST(Dwm1001, NamesTheOptionThatIsWrong) {
 }
 
 }  // namespace
-}  // namespace anchord::dwm1001
+}  // namespace anchord::dwm1001::tag_test

@@ -5,7 +5,7 @@
 
 #include "samples.hpp"
 
-namespace anchord::gnss {
+namespace anchord::gnss::binary_test {
 namespace {
 
 using namespace test;
@@ -297,4 +297,4 @@ TEST(Erb, HasNeitherTimeNorPositionBeforeTheFirstSolution) {
 }
 
 }  // namespace
-}  // namespace anchord::gnss
+}  // namespace anchord::gnss::binary_test

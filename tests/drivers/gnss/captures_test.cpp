@@ -14,7 +14,7 @@
 
 // Recorded logs and the values an independent decoder (or the producer's own input) has for them.
 
-namespace anchord::gnss {
+namespace anchord::gnss::captures_test {
 namespace {
 
 using namespace test;
@@ -271,4 +271,4 @@ TEST_F(Captures, EveryPrefixGivesOnlyPositionsOfTheWhole) {
 }
 
 }  // namespace
-}  // namespace anchord::gnss
+}  // namespace anchord::gnss::captures_test

@@ -3,7 +3,7 @@
 
 #include "samples.hpp"
 
-namespace anchord::gnss {
+namespace anchord::gnss::gpsd_test {
 namespace {
 
 using namespace test;
@@ -157,4 +157,4 @@ TEST(Gpsd, CountsWhatIsNoReport) {
 }
 
 }  // namespace
-}  // namespace anchord::gnss
+}  // namespace anchord::gnss::gpsd_test

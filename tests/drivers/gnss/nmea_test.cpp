@@ -5,7 +5,7 @@
 
 #include "samples.hpp"
 
-namespace anchord::gnss {
+namespace anchord::gnss::nmea_test {
 namespace {
 
 using namespace test;
@@ -252,4 +252,4 @@ TEST(NmeaFraming, TakesLongSentencesOfAMakersOwn) {
 }
 
 }  // namespace
-}  // namespace anchord::gnss
+}  // namespace anchord::gnss::nmea_test

@@ -9,7 +9,7 @@
 // Noise on the wire: nothing crashes, no frame with a wrong checksum is taken, and the next good one is
 // found.
 
-namespace anchord::gnss {
+namespace anchord::gnss::robustness_test {
 namespace {
 
 using namespace test;
@@ -196,4 +196,4 @@ INSTANTIATE_TEST_SUITE_P(Formats, Robustness, testing::Range<std::size_t>(0, 5),
                          [](const auto& param) { return std::string(streams()[param.param].name); });
 
 }  // namespace
-}  // namespace anchord::gnss
+}  // namespace anchord::gnss::robustness_test

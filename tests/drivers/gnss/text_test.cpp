@@ -3,7 +3,7 @@
 
 #include "samples.hpp"
 
-namespace anchord::gnss {
+namespace anchord::gnss::text_test {
 namespace {
 
 using namespace test;
@@ -199,4 +199,4 @@ TEST(Detection, FindsReportsBehindALoggersTimeStamp) {
 }
 
 }  // namespace
-}  // namespace anchord::gnss
+}  // namespace anchord::gnss::text_test

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace anchord::link {
+namespace anchord::link::address_test {
 namespace {
 
 TEST(LinkAddress, TakesEveryKindAndWritesItBack) {
@@ -39,4 +39,4 @@ TEST(LinkAddress, SaysWhichPartIsWrong) {
 }
 
 }  // namespace
-}  // namespace anchord::link
+}  // namespace anchord::link::address_test

@@ -7,7 +7,7 @@
 
 // Two links against each other over real sockets.
 
-namespace anchord::link {
+namespace anchord::link::link_test {
 namespace {
 
 using test::run_until;
@@ -234,4 +234,4 @@ TEST(Links, MayBeClosedFromTheirOwnHandler) {
 }
 
 }  // namespace
-}  // namespace anchord::link
+}  // namespace anchord::link::link_test

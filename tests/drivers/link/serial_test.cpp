@@ -13,7 +13,7 @@
 
 // Real ptys: the kernel's terminal, the test at the device's end.
 
-namespace anchord::link {
+namespace anchord::link::serial_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -160,4 +160,4 @@ TEST(SerialPorts, TwoNamesOfOneDeviceHaveOneNumber) {
 }
 
 }  // namespace
-}  // namespace anchord::link
+}  // namespace anchord::link::serial_test

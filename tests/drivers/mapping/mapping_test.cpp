@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace anchord::mapping {
+namespace anchord::mapping::mapping_test {
 namespace {
 
 std::string why(const std::string& json) {
@@ -85,4 +85,4 @@ TEST(Mapping, ReadsIdsInTheFormTheyHave) {
 }
 
 }  // namespace
-}  // namespace anchord::mapping
+}  // namespace anchord::mapping::mapping_test

@@ -6,7 +6,7 @@
 #include "drivers/device/settings.hpp"
 #include "tests/drivers/device/collect.hpp"
 
-namespace anchord::mapping {
+namespace anchord::mapping::ndjson_test {
 namespace {
 
 using device::test::Collect;
@@ -220,4 +220,4 @@ TEST(Ndjson, NamesTheOptionThatIsWrong) {
 }
 
 }  // namespace
-}  // namespace anchord::mapping
+}  // namespace anchord::mapping::ndjson_test

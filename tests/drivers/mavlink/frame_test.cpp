@@ -6,7 +6,7 @@
 #include <numbers>
 #include <string>
 
-namespace anchord::mavlink {
+namespace anchord::mavlink::frame_test {
 namespace {
 
 using Bytes = std::vector<std::uint8_t>;
@@ -239,4 +239,4 @@ TEST(MavlinkSigning, TimeCountsTenMicrosecondsSince2015) {
 }
 
 }  // namespace
-}  // namespace anchord::mavlink
+}  // namespace anchord::mavlink::frame_test

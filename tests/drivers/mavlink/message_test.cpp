@@ -6,7 +6,7 @@
 
 #include "drivers/mavlink/frame.hpp"
 
-namespace anchord::mavlink {
+namespace anchord::mavlink::message_test {
 namespace {
 
 std::string_view wire_type(FieldType type) {
@@ -111,4 +111,4 @@ TEST(MavlinkMessage, ANameThatIsNotInTheTableIsOurMistake) {
 }
 
 }  // namespace
-}  // namespace anchord::mavlink
+}  // namespace anchord::mavlink::message_test

@@ -11,7 +11,7 @@
 #include "drivers/record/recorder.hpp"
 #include "tests/server/mqtt/mosquitto.hpp"
 
-namespace anchord::mqtt {
+namespace anchord::mqtt::broker_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -91,4 +91,4 @@ TEST(MqttDevice, ReadsRangesOfARealBrokerOverItsRestartAndReplaysThem) {
 }
 
 }  // namespace
-}  // namespace anchord::mqtt
+}  // namespace anchord::mqtt::broker_test

@@ -4,7 +4,7 @@
 
 #include <random>
 
-namespace anchord::mqtt {
+namespace anchord::mqtt::packet_test {
 namespace {
 
 using namespace std::string_literals;
@@ -121,4 +121,4 @@ TEST(MqttPacket, BearsAnyBytes) {
 }
 
 }  // namespace
-}  // namespace anchord::mqtt
+}  // namespace anchord::mqtt::packet_test

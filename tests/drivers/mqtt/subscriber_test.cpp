@@ -9,7 +9,7 @@
 #include "drivers/mqtt/packet.hpp"
 #include "tests/drivers/device/collect.hpp"
 
-namespace anchord::mqtt {
+namespace anchord::mqtt::subscriber_test {
 namespace {
 
 using namespace std::string_literals;
@@ -248,4 +248,4 @@ TEST(PozyxPositions, RefuseWhatIsNoUpdate) {
 }
 
 }  // namespace
-}  // namespace anchord::mqtt
+}  // namespace anchord::mqtt::subscriber_test

@@ -11,7 +11,7 @@
 #include "drivers/device/settings.hpp"
 #include "tests/drivers/device/collect.hpp"
 
-namespace anchord::ntrip {
+namespace anchord::ntrip::client_test {
 namespace {
 
 using device::test::Collect;
@@ -204,4 +204,4 @@ TEST(NtripClient, RefusesSettingsThatWouldBreakTheRequest) {
 }
 
 }  // namespace
-}  // namespace anchord::ntrip
+}  // namespace anchord::ntrip::client_test

@@ -5,7 +5,7 @@
 #include "drivers/pozyx/registers.hpp"
 #include "tests/drivers/pozyx/transcript.hpp"
 
-namespace anchord::pozyx {
+namespace anchord::pozyx::protocol_test {
 namespace {
 
 class Transcripts : public testing::TestWithParam<const char*> {};
@@ -96,4 +96,4 @@ TEST(PozyxRegisters, DoNotOverlapAndFillTheSensorBlock) {
 }
 
 }  // namespace
-}  // namespace anchord::pozyx
+}  // namespace anchord::pozyx::protocol_test

@@ -4,7 +4,7 @@
 
 #include "tests/drivers/pozyx/simulated_wire.hpp"
 
-namespace anchord::pozyx {
+namespace anchord::pozyx::tag_test {
 namespace {
 
 /// Runs scripts of one tag against the simulated one.
@@ -215,4 +215,4 @@ TEST(PozyxTag, KnowsItsHeadingFromACalibratedCompassOnly) {
 }
 
 }  // namespace
-}  // namespace anchord::pozyx
+}  // namespace anchord::pozyx::tag_test

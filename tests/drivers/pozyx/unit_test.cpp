@@ -8,7 +8,7 @@
 #include "tests/drivers/device/collect.hpp"
 #include "tests/drivers/pozyx/simulated_wire.hpp"
 
-namespace anchord::pozyx {
+namespace anchord::pozyx::unit_test {
 namespace {
 
 using device::test::Collect;
@@ -261,4 +261,4 @@ TEST(PozyxUnit, RefusesSettingsItDoesNotKnow) {
 }
 
 }  // namespace
-}  // namespace anchord::pozyx
+}  // namespace anchord::pozyx::unit_test

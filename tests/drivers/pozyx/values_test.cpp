@@ -8,7 +8,7 @@
 #include "drivers/pozyx/diagnostics.hpp"
 #include "drivers/sim/impulse.hpp"
 
-namespace anchord::pozyx {
+namespace anchord::pozyx::values_test {
 namespace {
 
 TEST(RangeInfo, IsReadAndItsFailureValuesAreNotRanges) {
@@ -125,4 +125,4 @@ TEST(CirDiagnostics, SeeAWallInTheSimulatedRecords) {
 }
 
 }  // namespace
-}  // namespace anchord::pozyx
+}  // namespace anchord::pozyx::values_test

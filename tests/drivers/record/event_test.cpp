@@ -5,7 +5,7 @@
 #include <random>
 #include <vector>
 
-namespace anchord::record {
+namespace anchord::record::event_test {
 namespace {
 
 TEST(Crc32c, HasThePublishedValues) {
@@ -75,4 +75,4 @@ TEST(Recording, AChangedByteEndsItThereAndIsNeverBelieved) {
 }
 
 }  // namespace
-}  // namespace anchord::record
+}  // namespace anchord::record::event_test

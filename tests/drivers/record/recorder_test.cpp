@@ -45,7 +45,7 @@ int note_sync(int fd, const char* name) {
 extern "C" int fdatasync(int fd) { return note_sync(fd, "fdatasync"); }
 extern "C" int fsync(int fd) { return note_sync(fd, "fsync"); }
 
-namespace anchord::record {
+namespace anchord::record::recorder_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -266,4 +266,4 @@ TEST(Recorder, AFullDiskIsToldAndTriedAgain) {
 }
 
 }  // namespace
-}  // namespace anchord::record
+}  // namespace anchord::record::recorder_test

@@ -12,7 +12,7 @@
 
 // What the live pipeline makes of its events, a recording of them makes again, byte for byte.
 
-namespace anchord::record {
+namespace anchord::record::replay_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -103,4 +103,4 @@ TEST(Replay, RebuildsTheSameRowsByteForByteThroughCutsNoiseTicksAndUnplugging) {
 }
 
 }  // namespace
-}  // namespace anchord::record
+}  // namespace anchord::record::replay_test

@@ -8,7 +8,7 @@
 #include <cmath>
 #include <limits>
 
-namespace anchord::sim {
+namespace anchord::sim::flight_test {
 namespace {
 
 SimulatedFlight fly(std::uint64_t seed, double duration_s = 60) {
@@ -112,4 +112,4 @@ TEST(SimulatedFlight, RefusesNonsense) {
 }
 
 }  // namespace
-}  // namespace anchord::sim
+}  // namespace anchord::sim::flight_test

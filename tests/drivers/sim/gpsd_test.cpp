@@ -11,7 +11,7 @@
 #include "tests/drivers/sim/program.hpp"
 #include "tests/ports.hpp"
 
-namespace anchord::sim {
+namespace anchord::sim::gpsd_test {
 namespace {
 
 constexpr const char* k_gpsd = "/usr/sbin/gpsd";
@@ -59,4 +59,4 @@ TEST(RealGpsd, BetweenTheSimulatedRoverAndOurDriverKeepsPositionFixClassAndHeigh
 }
 
 }  // namespace
-}  // namespace anchord::sim
+}  // namespace anchord::sim::gpsd_test

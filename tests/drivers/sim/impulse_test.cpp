@@ -8,7 +8,7 @@
 #include "core/base/angle.hpp"
 #include "core/nlos/cir.hpp"
 
-namespace anchord::sim {
+namespace anchord::sim::impulse_test {
 namespace {
 
 Exchange exchange_at(double rss_dbm, double wall_loss_db) {
@@ -99,4 +99,4 @@ TEST(Exchange, IsStrongestOnTheLevelOfTheAnchorAndWithALobeTowardsIt) {
 }
 
 }  // namespace
-}  // namespace anchord::sim
+}  // namespace anchord::sim::impulse_test

@@ -5,7 +5,7 @@
 #include "core/base/angle.hpp"
 #include "drivers/sim/scenario.hpp"
 
-namespace anchord::sim {
+namespace anchord::sim::path_test {
 namespace {
 
 TEST(FlightPath, FliesHoldsTurnsAndLoops) {
@@ -73,4 +73,4 @@ TEST(Scenario, OfTheDemonstrationCanRunAndNonsenseCannot) {
 }
 
 }  // namespace
-}  // namespace anchord::sim
+}  // namespace anchord::sim::path_test

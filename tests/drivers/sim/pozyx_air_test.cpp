@@ -14,7 +14,7 @@
 #include "tests/drivers/sim/pozyx_host.hpp"
 #include "tests/paths.hpp"
 
-namespace anchord::sim {
+namespace anchord::sim::pozyx_air_test {
 namespace {
 
 /// Four anchors in the open that determine a position, tags 0x6000 and 0x6010 a metre apart; nothing is lost.
@@ -344,4 +344,4 @@ TEST(SimulatedTags, AnswerUnderANewIdAtOnce) {
 }
 
 }  // namespace
-}  // namespace anchord::sim
+}  // namespace anchord::sim::pozyx_air_test

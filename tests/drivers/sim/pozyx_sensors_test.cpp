@@ -6,7 +6,7 @@
 
 #include "tests/drivers/sim/pozyx_host.hpp"
 
-namespace anchord::sim {
+namespace anchord::sim::pozyx_sensors_test {
 namespace {
 
 /// Its nose to the east.
@@ -87,4 +87,4 @@ TEST(SimulatedSensors, AreNoneInAnAnchor) {
 }
 
 }  // namespace
-}  // namespace anchord::sim
+}  // namespace anchord::sim::pozyx_sensors_test

@@ -6,7 +6,7 @@
 #include "tests/drivers/pozyx/transcript.hpp"
 #include "tests/drivers/sim/pozyx_host.hpp"
 
-namespace anchord::sim {
+namespace anchord::sim::pozyx_tag_test {
 namespace {
 
 TEST(SimulatedTag, AnswersTheConversationsOfTheProtocolDescription) {
@@ -251,4 +251,4 @@ TEST(SimulatedTag, HasTheFailuresOfItsScenario) {
 }
 
 }  // namespace
-}  // namespace anchord::sim
+}  // namespace anchord::sim::pozyx_tag_test

@@ -7,7 +7,7 @@
 
 #include "core/planning/walls.hpp"
 
-namespace anchord::sim {
+namespace anchord::sim::radio_test {
 namespace {
 
 World one_wall(const Material& material, double thickness_m) {
@@ -96,4 +96,4 @@ TEST(Exchange, IsLostBelowTheSensitivity) {
 }
 
 }  // namespace
-}  // namespace anchord::sim
+}  // namespace anchord::sim::radio_test

@@ -17,7 +17,7 @@
 #include "drivers/device/device_loop.hpp"
 #include "drivers/sim/rover_formats.hpp"
 
-namespace anchord::sim {
+namespace anchord::sim::rig_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -288,4 +288,4 @@ TEST(Rig, DevicesPulledTwoHundredTimesComeBackAndNothingLeaks) {
 }
 
 }  // namespace
-}  // namespace anchord::sim
+}  // namespace anchord::sim::rig_test

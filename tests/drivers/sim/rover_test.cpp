@@ -6,7 +6,7 @@
 
 #include "drivers/gnss/decoder.hpp"
 
-namespace anchord::sim {
+namespace anchord::sim::rover_test {
 namespace {
 
 std::string hex(std::string_view bytes) {
@@ -137,4 +137,4 @@ INSTANTIATE_TEST_SUITE_P(All, EachFormat,
                          [](const auto& each) { return std::string(to_string(each.param)); });
 
 }  // namespace
-}  // namespace anchord::sim
+}  // namespace anchord::sim::rover_test

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace anchord::sim {
+namespace anchord::sim::scenario_file_test {
 namespace {
 
 TEST(ScenarioFile, TakesWhatItSaysAndLeavesTheRestAsInTheDemonstration) {
@@ -53,4 +53,4 @@ TEST(ScenarioFile, NamesWhatIsWrong) {
 }
 
 }  // namespace
-}  // namespace anchord::sim
+}  // namespace anchord::sim::scenario_file_test

@@ -10,7 +10,7 @@
 #include "core/localize/flight_solver.hpp"
 #include "drivers/sim/flight.hpp"
 
-namespace anchord::sim {
+namespace anchord::sim::solved_test {
 namespace {
 
 struct AnchorError {
@@ -133,4 +133,4 @@ TEST(SimulatedFlight, IsAcceptedWhereTheTrackComesBackWhereItWas) {
 }
 
 }  // namespace
-}  // namespace anchord::sim
+}  // namespace anchord::sim::solved_test

@@ -17,7 +17,7 @@
 #include "tests/drivers/sim/program.hpp"
 #include "tests/ports.hpp"
 
-namespace anchord::sim {
+namespace anchord::sim::str2str_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -168,4 +168,4 @@ TEST_F(Str2str, AsACasterGivesCorrectionsThatReachTheRoverWhole) {
 }
 
 }  // namespace
-}  // namespace anchord::sim
+}  // namespace anchord::sim::str2str_test

@@ -7,7 +7,7 @@
 
 #include "drivers/sim/radio.hpp"
 
-namespace anchord::sim {
+namespace anchord::sim::two_way_test {
 namespace {
 
 constexpr double k_light_mps = 299'792'458.0;
@@ -59,4 +59,4 @@ TEST(Exchange, ReportsWhatTheClocksOfBothEndsMakeOfIt) {
 }
 
 }  // namespace
-}  // namespace anchord::sim
+}  // namespace anchord::sim::two_way_test

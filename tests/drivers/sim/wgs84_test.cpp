@@ -4,7 +4,7 @@
 
 #include <GeographicLib/LocalCartesian.hpp>
 
-namespace anchord::sim {
+namespace anchord::sim::wgs84_test {
 namespace {
 
 TEST(SimulatedGlobe, AgreesWithGeographicLibToAMicrometre) {
@@ -22,4 +22,4 @@ TEST(SimulatedGlobe, AgreesWithGeographicLibToAMicrometre) {
 }
 
 }  // namespace
-}  // namespace anchord::sim
+}  // namespace anchord::sim::wgs84_test

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <random>
 
-namespace anchord::timing {
+namespace anchord::timing::clock_model_test {
 namespace {
 
 constexpr std::int64_t k_ms = 1'000'000, k_s = 1'000'000'000;
@@ -142,4 +142,4 @@ TEST(Unwrap, CountsOnPastTheWrapAndBearsSmallStepsBack) {
 }
 
 }  // namespace
-}  // namespace anchord::timing
+}  // namespace anchord::timing::clock_model_test

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace anchord::timing {
+namespace anchord::timing::time_base_test {
 namespace {
 
 constexpr std::int64_t k_second_ns = 1'000'000'000;
@@ -117,4 +117,4 @@ TEST(TimeBase, AnotherReceiverTakesOverFromOneThatFellSilentForHalfAMinuteAndNot
 }
 
 }  // namespace
-}  // namespace anchord::timing
+}  // namespace anchord::timing::time_base_test

@@ -7,7 +7,7 @@
 #include "tests/server/app/app_fixture.hpp"
 #include "tests/server/http/ws_client.hpp"
 
-namespace anchord::test {
+namespace anchord::test::access_over_http_test {
 namespace {
 
 std::string concrete(std::string pattern) {
@@ -376,4 +376,4 @@ TEST(StartUp, RefusesAFolderThatIsInUse) {
 }
 
 }  // namespace
-}  // namespace anchord::test
+}  // namespace anchord::test::access_over_http_test

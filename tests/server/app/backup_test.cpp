@@ -7,7 +7,7 @@
 #include "tests/server/app/app_fixture.hpp"
 #include "tests/server/storage/scratch_dir.hpp"
 
-namespace anchord::test {
+namespace anchord::test::backup_test {
 namespace {
 
 const std::function<bool()> k_on = [] { return true; };
@@ -223,4 +223,4 @@ TEST(BackupOverHttp, IsMadeByAdminsOnlyAndListed) {
 }
 
 }  // namespace
-}  // namespace anchord::test
+}  // namespace anchord::test::backup_test

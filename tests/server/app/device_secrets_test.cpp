@@ -10,7 +10,7 @@
 
 #include "tests/server/app/app_fixture.hpp"
 
-namespace anchord::test {
+namespace anchord::test::device_secrets_test {
 namespace {
 
 using Json = nlohmann::json;
@@ -255,4 +255,4 @@ TEST(DeviceAddresses, OpenNothingThatIsNoTerminalLine) {
 }
 
 }  // namespace
-}  // namespace anchord::test
+}  // namespace anchord::test::device_secrets_test

@@ -14,7 +14,7 @@
 #include "server/runtime/device_manager.hpp"
 #include "tests/server/app/rover_fixture.hpp"
 
-namespace anchord::test {
+namespace anchord::test::devices_over_http_test {
 namespace {
 
 TEST(DevicesOverHttp, ARoverSetUpOverRestIsHeardAndItsPositionsAreOfTheMissionThatRecords) {
@@ -224,4 +224,4 @@ TEST(DevicesOverHttp, ARecordingGivesTheRowsThatWereStoredByteForByte) {
 }
 
 }  // namespace
-}  // namespace anchord::test
+}  // namespace anchord::test::devices_over_http_test

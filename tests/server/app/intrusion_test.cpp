@@ -11,7 +11,7 @@
 #include "tests/server/app/app_fixture.hpp"
 #include "tests/server/http/ws_client.hpp"
 
-namespace anchord::test {
+namespace anchord::test::intrusion_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -418,4 +418,4 @@ TEST(Commands, AreAnsweredWhileTheDatabaseTakesNoWrite) {
 }
 
 }  // namespace
-}  // namespace anchord::test
+}  // namespace anchord::test::intrusion_test

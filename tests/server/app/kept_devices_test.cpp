@@ -9,7 +9,7 @@
 #include "server/runtime/device_manager.hpp"
 #include "tests/server/app/app_fixture.hpp"
 
-namespace anchord::test {
+namespace anchord::test::kept_devices_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -165,4 +165,4 @@ TEST(KeptDevices, AFileThatIsNoListStartsWithoutDevicesAndIsKept) {
 }
 
 }  // namespace
-}  // namespace anchord::test
+}  // namespace anchord::test::kept_devices_test

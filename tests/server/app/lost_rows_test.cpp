@@ -9,7 +9,7 @@
 #include "tests/server/app/rover_fixture.hpp"
 #include "tests/server/storage/stuck_disk.hpp"
 
-namespace anchord::test {
+namespace anchord::test::lost_rows_test {
 namespace {
 
 /// What the real program prints on standard output.
@@ -90,4 +90,4 @@ TEST(LostRows, AreAnAlarmWithTheirNumberAndComeBackFromTheRecordingThatItNames) 
 }
 
 }  // namespace
-}  // namespace anchord::test
+}  // namespace anchord::test::lost_rows_test

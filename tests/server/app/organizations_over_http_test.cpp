@@ -3,7 +3,7 @@
 
 #include "tests/server/app/app_fixture.hpp"
 
-namespace anchord::test {
+namespace anchord::test::organizations_over_http_test {
 namespace {
 
 using Json = nlohmann::json;
@@ -156,4 +156,4 @@ TEST_F(Centre, TakesEveryMeasurementAndCommandWhateverTheQuota) {
 }
 
 }  // namespace
-}  // namespace anchord::test
+}  // namespace anchord::test::organizations_over_http_test

@@ -8,7 +8,7 @@
 #include "tests/paths.hpp"
 #include "tests/server/app/app_fixture.hpp"
 
-namespace anchord::test {
+namespace anchord::test::threads_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -55,4 +55,4 @@ TEST(Threads, OfARunningServerAreThoseThatTheArchitectureLists) {
 }
 
 }  // namespace
-}  // namespace anchord::test
+}  // namespace anchord::test::threads_test

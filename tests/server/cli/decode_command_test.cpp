@@ -12,6 +12,7 @@
 
 #include "tests/paths.hpp"
 
+namespace anchord::decode_command_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -158,3 +159,4 @@ TEST_F(DecodeCommand, ReadsAPipeCutAnywhere) {
 }
 
 }  // namespace
+}  // namespace anchord::decode_command_test

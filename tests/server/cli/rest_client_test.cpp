@@ -3,7 +3,7 @@
 #include "api/measurements/flight_requests.hpp"
 #include "tests/server/app/app_fixture.hpp"
 
-namespace anchord::test {
+namespace anchord::test::rest_client_test {
 namespace {
 
 /// A client as the commands use it, and a mission to send rows to.
@@ -48,4 +48,4 @@ TEST_F(RestClientTest, TakesAnotherRefusalForAnError) {
 }
 
 }  // namespace
-}  // namespace anchord::test
+}  // namespace anchord::test::rest_client_test

@@ -7,7 +7,7 @@
 #include "server/http/http_client.hpp"
 #include "tests/server/app/app_fixture.hpp"
 
-namespace anchord::test {
+namespace anchord::test::site_source_test {
 namespace {
 
 class SiteSource : public ::testing::Test {
@@ -66,4 +66,4 @@ TEST_F(SiteSource, RefusesASiteWithoutAnOriginOrThatIsNotThere) {
 }
 
 }  // namespace
-}  // namespace anchord::test
+}  // namespace anchord::test::site_source_test

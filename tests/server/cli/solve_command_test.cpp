@@ -17,6 +17,7 @@
 
 #include "tests/paths.hpp"
 
+namespace anchord::solve_command_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -408,3 +409,4 @@ TEST_F(SolveCommand, LeavesModelsOutOfAFlightThatTheyDoNotExplain) {
 }
 
 }  // namespace
+}  // namespace anchord::solve_command_test

@@ -10,7 +10,7 @@
 #include "core/base/text.hpp"
 #include "server/cli/text_table.hpp"
 
-namespace anchord::test {
+namespace anchord::test::top_screen_test {
 namespace {
 
 using Json = nlohmann::json;
@@ -307,4 +307,4 @@ TEST(TextTable, AlignsNumbersToTheRightAndKeepsARowThatEndsEarly) {
 TEST(TextTable, MakesOneLineOfTextWithBreaks) { EXPECT_EQ(one_line("a\nb\tc\rd"), "a b c\\x0dd"); }
 
 }  // namespace
-}  // namespace anchord::test
+}  // namespace anchord::test::top_screen_test

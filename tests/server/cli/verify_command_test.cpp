@@ -14,7 +14,7 @@
 #include "core/base/sha256.hpp"
 #include "tests/paths.hpp"
 
-namespace anchord::api {
+namespace anchord::api::verify_command_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -161,4 +161,4 @@ TEST_F(VerifyCommand, AgreesWithOpenSslAboutTheSignature) {
 }
 
 }  // namespace
-}  // namespace anchord::api
+}  // namespace anchord::api::verify_command_test

@@ -12,7 +12,7 @@
 #include "server/runtime/log_line.hpp"
 #include "server/storage/sqlite_database.hpp"
 
-namespace anchord::server {
+namespace anchord::server::config_test {
 namespace {
 
 class ConfigFile {
@@ -144,4 +144,4 @@ TEST(Listeners, BeyondLoopbackNeedTlsOrASayingThatThereIsNone) {
 TEST(Config, SaysThatTheFileIsMissing) { EXPECT_FALSE(load_config({}, "/nowhere/anchord.toml", {})); }
 
 }  // namespace
-}  // namespace anchord::server
+}  // namespace anchord::server::config_test

@@ -11,7 +11,7 @@
 #include "core/geo/enu.hpp"
 #include "core/planning/local_plan.hpp"
 
-namespace anchord::flight {
+namespace anchord::flight::closed_loop_test {
 namespace {
 
 struct Row {
@@ -199,4 +199,4 @@ TEST(ClosedLoop, AFlightAlongOneFrontKnowsTheSideFromItsTurn) {
 }
 
 }  // namespace
-}  // namespace anchord::flight
+}  // namespace anchord::flight::closed_loop_test

@@ -22,7 +22,7 @@
 #include "drivers/sim/ports.hpp"
 #include "tests/ports.hpp"
 
-namespace anchord::flight {
+namespace anchord::flight::drone_link_test {
 namespace {
 
 using Clock = std::chrono::steady_clock;
@@ -332,4 +332,4 @@ TEST(DroneLink, FliesTheAircraftOverASerialLineAndComesBackAfterALoss) {
 }
 
 }  // namespace
-}  // namespace anchord::flight
+}  // namespace anchord::flight::drone_link_test

@@ -14,7 +14,7 @@
 #include "server/flight/inline_flight.hpp"
 #include "server/flight/sim_kit.hpp"
 
-namespace anchord {
+namespace anchord::flight_replay_test {
 namespace {
 
 constexpr std::int64_t k_unix_us = 1'777'888'800'000'000;
@@ -251,4 +251,4 @@ TEST(FlightReplay, ARecordedFlightGivesTheSameEventsAndCommandsByteForByte) {
 }
 
 }  // namespace
-}  // namespace anchord
+}  // namespace anchord::flight_replay_test

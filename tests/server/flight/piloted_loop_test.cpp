@@ -11,7 +11,7 @@
 #include "core/planning/local_plan.hpp"
 #include "server/flight/closed_loop.hpp"
 
-namespace anchord::flight {
+namespace anchord::flight::piloted_loop_test {
 namespace {
 
 ClosedLoopOptions hostile(std::uint64_t seed) {
@@ -77,4 +77,4 @@ TEST(PilotedLoop, LandsAtHomeClearOfTheBuildingAndFindsTheAnchorsWithEverythingO
 }
 
 }  // namespace
-}  // namespace anchord::flight
+}  // namespace anchord::flight::piloted_loop_test

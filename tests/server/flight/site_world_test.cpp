@@ -6,7 +6,7 @@
 #include "core/geo/enu.hpp"
 #include "core/planning/local_plan.hpp"
 
-namespace anchord::flight {
+namespace anchord::flight::site_world_test {
 namespace {
 
 const Wgs84 k_origin{51, 3.7, 20};
@@ -85,4 +85,4 @@ TEST(SiteScene, OfASiteWithoutAcceptedPlansIsOpenGround) {
 }
 
 }  // namespace
-}  // namespace anchord::flight
+}  // namespace anchord::flight::site_world_test

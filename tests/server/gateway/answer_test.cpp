@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-namespace anchord::gateway {
+namespace anchord::gateway::answer_test {
 namespace {
 
 using std::chrono::seconds;
@@ -86,4 +86,4 @@ TEST(GatewayAnswer, PausesDoubleUpToALimitAndAreNeverAlike) {
 }
 
 }  // namespace
-}  // namespace anchord::gateway
+}  // namespace anchord::gateway::answer_test

@@ -11,7 +11,7 @@
 #include "server/gateway/row_lines.hpp"
 #include "tests/server/storage/scratch_dir.hpp"
 
-namespace anchord::gateway {
+namespace anchord::gateway::delivery_test {
 namespace {
 
 using Json = nlohmann::json;
@@ -145,4 +145,4 @@ TEST(GatewayBatches, GroupsByMissionAndKindWithFixesFirst) {
 }
 
 }  // namespace
-}  // namespace anchord::gateway
+}  // namespace anchord::gateway::delivery_test

@@ -9,7 +9,7 @@
 #include "tests/server/storage/child.hpp"
 #include "tests/server/storage/scratch_dir.hpp"
 
-namespace anchord::gateway {
+namespace anchord::gateway::outbox_test {
 namespace {
 
 constexpr std::uint64_t k_roomy = 64u << 20;
@@ -165,4 +165,4 @@ TEST(GatewayOutbox, HasEveryRowItAcknowledgedAfterKill9AtRandomInstants) {
 }
 
 }  // namespace
-}  // namespace anchord::gateway
+}  // namespace anchord::gateway::outbox_test

@@ -9,7 +9,7 @@
 #include "api/wire/rows_json.hpp"
 #include "tests/core/types/full_rows.hpp"
 
-namespace anchord::gateway {
+namespace anchord::gateway::row_lines_test {
 namespace {
 
 using Json = nlohmann::json;
@@ -89,4 +89,4 @@ TEST(GatewayRows, RangesWithAnImpulseResponseAreJson) {
 }
 
 }  // namespace
-}  // namespace anchord::gateway
+}  // namespace anchord::gateway::row_lines_test

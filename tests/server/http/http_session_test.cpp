@@ -4,7 +4,7 @@
 
 #include "tests/server/http/http_fixture.hpp"
 
-namespace anchord::test {
+namespace anchord::test::http_session_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -510,4 +510,4 @@ TEST(Listening, TellsLoopbackFromTheRest) {
 }
 
 }  // namespace
-}  // namespace anchord::test
+}  // namespace anchord::test::http_session_test

@@ -5,7 +5,7 @@
 
 #include <random>
 
-namespace anchord::server {
+namespace anchord::server::proxy_header_test {
 namespace {
 
 using State = ProxyHeader::State;
@@ -89,4 +89,4 @@ TEST(ProxyHeader, OfAnyBytesStaysInsideThem) {
 }
 
 }  // namespace
-}  // namespace anchord::server
+}  // namespace anchord::server::proxy_header_test

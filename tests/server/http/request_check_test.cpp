@@ -4,7 +4,7 @@
 
 #include "server/http/request_parser.hpp"
 
-namespace anchord::server {
+namespace anchord::server::request_check_test {
 namespace {
 
 const HostPolicy k_policy{{"localhost", "127.0.0.1", "[::1]"}, {"https://portal.example"}};
@@ -223,4 +223,4 @@ TEST(RequestCheck, NeverTakesATruncatedHead) {
 }
 
 }  // namespace
-}  // namespace anchord::server
+}  // namespace anchord::server::request_check_test

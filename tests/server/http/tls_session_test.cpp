@@ -11,7 +11,7 @@
 #include "tests/server/http/http_fixture.hpp"
 #include "tests/server/tls/certificate_folder.hpp"
 
-namespace anchord {
+namespace anchord::tls_session_test {
 namespace {
 
 using namespace test;
@@ -266,4 +266,4 @@ TEST(TlsSession, CarriesAWebSocket) {
 }
 
 }  // namespace
-}  // namespace anchord
+}  // namespace anchord::tls_session_test

@@ -6,7 +6,7 @@
 #include "tests/server/http/http_fixture.hpp"
 #include "tests/server/http/ws_client.hpp"
 
-namespace anchord::test {
+namespace anchord::test::ws_session_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -244,4 +244,4 @@ TEST_F(WsLimitsTest, TakesNoMoreFramesForAClientThatDoesNotRead) {
 }
 
 }  // namespace
-}  // namespace anchord::test
+}  // namespace anchord::test::ws_session_test

@@ -8,7 +8,7 @@
 #include "tests/server/mqtt/mosquitto.hpp"
 #include "tests/server/storage/child.hpp"
 
-namespace anchord::test {
+namespace anchord::test::mqtt_broker_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -253,4 +253,4 @@ TEST(MqttPassword, IsTheFirstLineOfAFileThatNobodyElseMayRead) {
 }
 
 }  // namespace
-}  // namespace anchord::test
+}  // namespace anchord::test::mqtt_broker_test

@@ -8,7 +8,7 @@
 
 #include "tests/server/storage/scratch_dir.hpp"
 
-namespace anchord::server {
+namespace anchord::server::chromium_pdf_test {
 namespace {
 
 std::string content(const std::filesystem::path& file) {
@@ -45,4 +45,4 @@ TEST(ChromiumPdf, SaysThatThereIsNoPage) {
 }
 
 }  // namespace
-}  // namespace anchord::server
+}  // namespace anchord::server::chromium_pdf_test

@@ -11,7 +11,7 @@
 #include <cstring>
 #include <string>
 
-namespace anchord::server {
+namespace anchord::server::service_manager_test {
 namespace {
 
 /// The socket a service manager listens on; an abstract name with '@' before it.
@@ -64,4 +64,4 @@ TEST(ServiceManager, IsNotMissedWhereThereIsNone) {
 }
 
 }  // namespace
-}  // namespace anchord::server
+}  // namespace anchord::server::service_manager_test

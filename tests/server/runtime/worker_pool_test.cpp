@@ -9,7 +9,7 @@
 #include <thread>
 #include <vector>
 
-namespace anchord::server {
+namespace anchord::server::worker_pool_test {
 namespace {
 
 /// Holds one thread of a pool until it is let go.
@@ -107,4 +107,4 @@ TEST(WorkerPool, WhatATaskThrowsEndsThatTaskAlone) {
 }
 
 }  // namespace
-}  // namespace anchord::server
+}  // namespace anchord::server::worker_pool_test

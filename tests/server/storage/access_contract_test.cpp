@@ -4,7 +4,7 @@
 #include "core/ports/token_store.hpp"
 #include "tests/server/storage/backends.hpp"
 
-namespace anchord {
+namespace anchord::access_contract_test {
 namespace {
 
 using testing::ElementsAre;
@@ -183,4 +183,4 @@ TEST_P(AccessContract, ChainsTheAuditLog) {
 INSTANTIATE_TEST_SUITE_P(Backends, AccessContract, backends(), backend_name);
 
 }  // namespace
-}  // namespace anchord
+}  // namespace anchord::access_contract_test

@@ -8,7 +8,7 @@
 #include "tests/server/storage/backends.hpp"
 #include "tests/server/storage/bundle_rows.hpp"
 
-namespace anchord {
+namespace anchord::bundle_contract_test {
 namespace {
 
 class BundleStoreContract : public StoreContract {
@@ -207,4 +207,4 @@ TEST_P(BundleStoreContract, AreOfFinishedMissionsAlone) {
 INSTANTIATE_TEST_SUITE_P(Backends, BundleStoreContract, backends(), backend_name);
 
 }  // namespace
-}  // namespace anchord
+}  // namespace anchord::bundle_contract_test

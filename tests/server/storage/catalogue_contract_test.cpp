@@ -12,7 +12,7 @@
 #include "core/ports/site_store.hpp"
 #include "tests/server/storage/backends.hpp"
 
-namespace anchord {
+namespace anchord::catalogue_contract_test {
 namespace {
 
 class MissionStoreContract : public StoreContract {};
@@ -526,4 +526,4 @@ TEST_P(AnchorStoreContract, KeepsFramesByNameAndVersion) {
 INSTANTIATE_TEST_SUITE_P(Backends, AnchorStoreContract, backends(), backend_name);
 
 }  // namespace
-}  // namespace anchord
+}  // namespace anchord::catalogue_contract_test

@@ -10,7 +10,7 @@
 #include "tests/server/storage/bundle_rows.hpp"
 #include "tests/server/storage/child.hpp"
 
-namespace anchord {
+namespace anchord::cir_archive_contract_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -346,4 +346,4 @@ TEST_P(CirArchiveContract, DeletesTheFileOfAFlightThatIsRemovedForGood) {
 INSTANTIATE_TEST_SUITE_P(Backends, CirArchiveContract, backends(), backend_name);
 
 }  // namespace
-}  // namespace anchord
+}  // namespace anchord::cir_archive_contract_test

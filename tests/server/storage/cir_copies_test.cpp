@@ -11,7 +11,7 @@
 #include "server/storage/sqlite_connection.hpp"
 #include "tests/server/storage/backends.hpp"
 
-namespace anchord {
+namespace anchord::cir_copies_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -341,4 +341,4 @@ TEST_F(PostgresCopyOfCirs, IsRefusedWithoutAFileUnlessItIsAskedFor) {
 }
 
 }  // namespace
-}  // namespace anchord
+}  // namespace anchord::cir_copies_test

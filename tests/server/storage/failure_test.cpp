@@ -18,7 +18,7 @@
 #include "tests/server/storage/store_contract.hpp"
 #include "tests/server/storage/stuck_disk.hpp"
 
-namespace anchord {
+namespace anchord::failure_test {
 namespace {
 
 /// Counted row by row: a count by a flight's radios would not miss one that is gone.
@@ -460,4 +460,4 @@ TEST_F(StorageFailure, BacksUpUnderLoadACopyThatPassesItsChecks) {
 }
 
 }  // namespace
-}  // namespace anchord
+}  // namespace anchord::failure_test

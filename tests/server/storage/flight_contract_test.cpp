@@ -8,7 +8,7 @@
 #include "core/ports/webhook_store.hpp"
 #include "tests/server/storage/backends.hpp"
 
-namespace anchord {
+namespace anchord::flight_contract_test {
 namespace {
 
 using testing::ElementsAre;
@@ -316,4 +316,4 @@ TEST_P(FlightStoreContract, ForgetsTheOldestDeliveriesOfAWebhook) {
 INSTANTIATE_TEST_SUITE_P(Backends, FlightStoreContract, backends(), backend_name);
 
 }  // namespace
-}  // namespace anchord
+}  // namespace anchord::flight_contract_test

@@ -7,7 +7,7 @@
 #include <array>
 #include <cstring>
 
-namespace anchord {
+namespace anchord::geopackage_test {
 namespace {
 
 FeatureTable points(std::vector<FeatureTable::Row> rows) {
@@ -53,4 +53,4 @@ TEST(GeoPackage, RefusesARowThatDoesNotFitItsColumns) {
 }
 
 }  // namespace
-}  // namespace anchord
+}  // namespace anchord::geopackage_test

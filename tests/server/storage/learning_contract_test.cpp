@@ -4,7 +4,7 @@
 #include "core/ports/learning_store.hpp"
 #include "tests/server/storage/backends.hpp"
 
-namespace anchord {
+namespace anchord::learning_contract_test {
 namespace {
 
 class LearningStoreContract : public StoreContract {
@@ -217,4 +217,4 @@ TEST_P(LearningStoreContract, OfEightPromotionsJudgedOnOneStateOneIsMade) {
 INSTANTIATE_TEST_SUITE_P(Backends, LearningStoreContract, backends(), backend_name);
 
 }  // namespace
-}  // namespace anchord
+}  // namespace anchord::learning_contract_test

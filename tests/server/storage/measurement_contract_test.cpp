@@ -8,7 +8,7 @@
 #include "core/ports/measurement_store.hpp"
 #include "tests/server/storage/backends.hpp"
 
-namespace anchord {
+namespace anchord::measurement_contract_test {
 namespace {
 
 using testing::Each;
@@ -452,4 +452,4 @@ TEST_P(MeasurementStoreContract, TakesEveryRowOnceFromManyThreadsAtOnce) {
 INSTANTIATE_TEST_SUITE_P(Backends, MeasurementStoreContract, backends(), backend_name);
 
 }  // namespace
-}  // namespace anchord
+}  // namespace anchord::measurement_contract_test

@@ -18,7 +18,7 @@
 #include "tests/server/storage/child.hpp"
 #include "tests/server/storage/store_contract.hpp"
 
-namespace anchord::sql {
+namespace anchord::sql::migrate_test {
 namespace {
 
 using Mode = SqliteConnection::Mode;
@@ -239,4 +239,4 @@ TEST_F(Migrate, WritesAStoredDatabaseWhenAsked) {
 }
 
 }  // namespace
-}  // namespace anchord::sql
+}  // namespace anchord::sql::migrate_test

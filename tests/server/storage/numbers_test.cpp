@@ -13,7 +13,7 @@
 #include "core/types/mission.hpp"
 #include "core/types/range.hpp"
 
-namespace anchord {
+namespace anchord::numbers_test {
 namespace {
 
 template <class T, std::size_t N>
@@ -43,4 +43,4 @@ TEST(StoredNumbers, StandForTheSameWordsInEveryVersion) {
 }
 
 }  // namespace
-}  // namespace anchord
+}  // namespace anchord::numbers_test

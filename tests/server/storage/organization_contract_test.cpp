@@ -7,7 +7,7 @@
 #include "tests/server/storage/backends.hpp"
 #include "tests/server/storage/bundle_rows.hpp"
 
-namespace anchord {
+namespace anchord::organization_contract_test {
 namespace {
 
 using testing::AllOf;
@@ -285,4 +285,4 @@ TEST_P(OrganizationContract, DoesNotLeaveWithABundleNorComeInWithOne) {
 INSTANTIATE_TEST_SUITE_P(Backends, OrganizationContract, backends(), backend_name);
 
 }  // namespace
-}  // namespace anchord
+}  // namespace anchord::organization_contract_test

@@ -3,7 +3,7 @@
 #include "core/ports/site_store.hpp"
 #include "tests/server/storage/backends.hpp"
 
-namespace anchord {
+namespace anchord::place_contract_test {
 namespace {
 
 class PlaceStoreContract : public StoreContract {
@@ -195,4 +195,4 @@ TEST_P(PlaceStoreContract, ForgetsTilesWithTheirPlanAndWithTheirFloor) {
 INSTANTIATE_TEST_SUITE_P(Backends, PlaceStoreContract, backends(), backend_name);
 
 }  // namespace
-}  // namespace anchord
+}  // namespace anchord::place_contract_test

@@ -12,7 +12,7 @@
 #include "server/storage/row_tables.hpp"
 #include "tests/server/storage/backends.hpp"
 
-namespace anchord::sql {
+namespace anchord::sql::postgres_test {
 namespace {
 
 using testing::HasSubstr;
@@ -539,4 +539,4 @@ TEST(PostgresOutage, ARestartBetweenTwoCallsIsNotNoticed) {
 }
 
 }  // namespace
-}  // namespace anchord::sql
+}  // namespace anchord::sql::postgres_test

@@ -11,7 +11,7 @@
 #include "server/storage/stores.hpp"
 #include "tests/server/storage/store_contract.hpp"
 
-namespace anchord::sql {
+namespace anchord::sql::query_plan_test {
 namespace {
 
 using testing::ElementsAre;
@@ -163,4 +163,4 @@ TEST_F(QueryPlan, ReadsOneRangeAndItsImpulseResponseByTheirKeys) {
 }
 
 }  // namespace
-}  // namespace anchord::sql
+}  // namespace anchord::sql::query_plan_test

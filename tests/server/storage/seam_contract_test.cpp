@@ -7,7 +7,7 @@
 #include "server/storage/sqlite_connection.hpp"
 #include "tests/server/storage/backends.hpp"
 
-namespace anchord::sql {
+namespace anchord::sql::seam_contract_test {
 namespace {
 
 /// A database behind the seam, with a table `seam` of all the types.
@@ -302,4 +302,4 @@ INSTANTIATE_TEST_SUITE_P(Backends, SeamContract,
                          [](const auto& side) { return side.param.name; });
 
 }  // namespace
-}  // namespace anchord::sql
+}  // namespace anchord::sql::seam_contract_test

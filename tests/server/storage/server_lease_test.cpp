@@ -14,7 +14,7 @@
 #include "server/storage/postgres_migrate.hpp"
 #include "tests/server/storage/backends.hpp"
 
-namespace anchord {
+namespace anchord::server_lease_test {
 namespace {
 
 using sql::PostgresConnection;
@@ -228,4 +228,4 @@ TEST_F(PostgresLease, IsKeptWhileTheTablesChangeForLongerThanItLasts) {
 }
 
 }  // namespace
-}  // namespace anchord
+}  // namespace anchord::server_lease_test

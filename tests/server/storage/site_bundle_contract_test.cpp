@@ -5,7 +5,7 @@
 #include "tests/server/storage/backends.hpp"
 #include "tests/server/storage/bundle_rows.hpp"
 
-namespace anchord {
+namespace anchord::site_bundle_contract_test {
 namespace {
 
 using testing::Contains;
@@ -182,4 +182,4 @@ TEST_P(SiteBundleContract, RefusesAsAWholeWhatIsOfAnotherSite) {
 INSTANTIATE_TEST_SUITE_P(Backends, SiteBundleContract, backends(), backend_name);
 
 }  // namespace
-}  // namespace anchord
+}  // namespace anchord::site_bundle_contract_test

@@ -7,7 +7,7 @@
 #include "tests/server/storage/backends.hpp"
 #include "tests/server/storage/bundle_rows.hpp"
 
-namespace anchord {
+namespace anchord::site_quota_contract_test {
 namespace {
 
 using testing::AllOf;
@@ -171,4 +171,4 @@ TEST_P(SiteQuotaContract, RefusesABundleAsAWholeAndTakesOneThatIsHere) {
 INSTANTIATE_TEST_SUITE_P(Backends, SiteQuotaContract, backends(), backend_name);
 
 }  // namespace
-}  // namespace anchord
+}  // namespace anchord::site_quota_contract_test

@@ -13,7 +13,7 @@
 #include "core/ports/job_store.hpp"
 #include "tests/server/storage/backends.hpp"
 
-namespace anchord {
+namespace anchord::work_store_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -354,4 +354,4 @@ TEST(SqliteWork, IsThereForOneProcessAlone) {
 }
 
 }  // namespace
-}  // namespace anchord
+}  // namespace anchord::work_store_test

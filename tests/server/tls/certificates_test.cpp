@@ -13,7 +13,7 @@
 #include "server/tls/tls_keeper.hpp"
 #include "tests/server/tls/certificate_folder.hpp"
 
-namespace anchord::server {
+namespace anchord::server::certificates_test {
 namespace {
 
 using test::CertificateFolder;
@@ -149,4 +149,4 @@ TEST(TlsWarnings, BeginThirtyDaysBeforeTheEnd) {
 }
 
 }  // namespace
-}  // namespace anchord::server
+}  // namespace anchord::server::certificates_test
