@@ -43,9 +43,9 @@ TEST(PlanInput, ReportsEverythingWrongAtOnceWithItsPointer) {
   EXPECT_THAT(pointers(R"({"dims":2,"visited_m":[[1,2],[1,"x"],[3]],"rule":"best","stepp":1,
       "anchors":[{"position_m":[0,0],"measured_at":[9]},{"name":"b"}],"grid":{"step_m":-1}})"),
               ::testing::UnorderedElementsAre("/visited_m/1/1 wrong_type", "/visited_m/2 wrong_type",
-                                            "/rule unknown_value", "/stepp unknown_field",
-                                            "/anchors/0/measured_at out_of_range",
-                                            "/anchors/1/position_m required", "/grid/step_m out_of_range"));
+                                              "/rule unknown_value", "/stepp unknown_field",
+                                              "/anchors/0/measured_at out_of_range",
+                                              "/anchors/1/position_m required", "/grid/step_m out_of_range"));
 }
 
 TEST(PlanInput, RefusesWhatIsNoPlanAtAll) {

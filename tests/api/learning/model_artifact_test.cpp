@@ -67,7 +67,7 @@ TEST_P(EveryMethod, PredictsTheSameAfterWritingAndReadingAndWritesTheSameBytes) 
 
 INSTANTIATE_TEST_SUITE_P(ModelArtifact, EveryMethod,
                          ::testing::Values(ml::Method::logistic, ml::Method::random_forest, ml::Method::svm,
-                                         ml::Method::boosted, ml::Method::average));
+                                           ml::Method::boosted, ml::Method::average));
 
 TEST(ModelArtifact, RefusesWhatIsWrongAndNamesThePlace) {
   const auto good = write_model_artifact(model_of(ml::Method::logistic));
