@@ -106,9 +106,10 @@ void Application::State::publish_system(UtcTime now, ServerPulse& pulse) {
 void Application::State::publish_alarms(UtcTime now, std::vector<AlarmCondition> holding,
                                         std::vector<std::pair<std::string_view, std::string>>& of_flight) {
   for (auto& [id, text] : of_flight) {
-    const bool told = std::any_of(holding.begin(), holding.end(), [&](const auto& c) { return c.id == id; });
-    if (!text.empty() && !told)
-      holding.push_back({std::string(id), AlarmPriority::critical, std::move(text), flights.mission()});
+    const auto mission = flights.mission();
+    const bool raised = std::ranges::any_of(holding, [&](const auto& c) { return c.is(id, mission); });
+    if (!text.empty() && !raised)
+      holding.push_back({std::string(id), AlarmPriority::critical, std::move(text), mission});
   }
   if (auto step = clock_watch.look(now, steady.now()); !step.empty())
     holding.push_back({"clock.step", AlarmPriority::warning, std::move(step), std::nullopt});

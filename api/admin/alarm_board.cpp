@@ -44,8 +44,8 @@ void AlarmBoard::update(std::vector<AlarmCondition> holding, UtcTime now) {
     auto alarms = alarms_.lock();
     std::vector<Alarm> next;
     for (auto& condition : holding) {
-      const auto before =
-          std::ranges::find(*alarms, condition.id, [](const Alarm& a) { return a.condition.id; });
+      const auto before = std::ranges::find_if(
+          *alarms, [&](const Alarm& a) { return a.condition.is(condition.id, condition.mission); });
       Alarm alarm{std::move(condition), now, false};
       if (before == alarms->end()) {
         raised.push_back(alarm.condition);
@@ -57,8 +57,9 @@ void AlarmBoard::update(std::vector<AlarmCondition> holding, UtcTime now) {
       next.push_back(std::move(alarm));
     }
     for (const auto& alarm : *alarms) {
-      if (std::ranges::none_of(next, [&](const Alarm& a) { return a.condition.id == alarm.condition.id; }))
-        cleared.push_back(alarm.condition);
+      const auto& was = alarm.condition;
+      if (std::ranges::none_of(next, [&](const Alarm& a) { return a.condition.is(was.id, was.mission); }))
+        cleared.push_back(was);
     }
     std::ranges::stable_sort(next, {},
                              [](const Alarm& a) { return std::tuple(a.condition.priority, a.since); });
@@ -69,12 +70,13 @@ void AlarmBoard::update(std::vector<AlarmCondition> holding, UtcTime now) {
   for (const auto& c : cleared) events_.add(EventLevel::info, "alarm.cleared", c.id + " is over", c.mission);
 }
 
-Result<Alarm> AlarmBoard::acknowledge(std::string_view id, std::string_view by) {
+Result<Alarm> AlarmBoard::acknowledge(std::string_view id, const std::optional<MissionId>& mission,
+                                      std::string_view by) {
   Alarm found;
   {
     auto alarms = alarms_.lock();
     const auto at =
-        std::ranges::find(*alarms, id, [](const Alarm& a) { return std::string_view(a.condition.id); });
+        std::ranges::find_if(*alarms, [&](const Alarm& a) { return a.condition.is(id, mission); });
     if (at == alarms->end())
       return make_error(Errc::not_found, "there is no active alarm " + to_utf8(id, 60));
     if (at->acknowledged) return *at;

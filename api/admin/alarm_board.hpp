@@ -26,15 +26,17 @@ std::string alarm_json(const Alarm& alarm);
 /// who fly. `site`: of its mission.
 bool concerns(const Alarm& alarm, const std::optional<SiteId>& site, const SiteSet& sites);
 
-/// The alarms that stand: raised when their condition begins, gone when it ends, quiet but visible once
-/// acknowledged. Raising, clearing and acknowledging are events. Thread-safe.
+/// The alarms that stand, one for each id and mission: raised when their condition begins, gone when it ends,
+/// quiet but visible once acknowledged. Raising, clearing and acknowledging are events. Thread-safe.
 class AlarmBoard {
  public:
   explicit AlarmBoard(EventLog& events) : events_(events) {}
   /// What holds now, about once a second.
   void update(std::vector<AlarmCondition> holding, UtcTime now);
-  /// Errors: not_found when no such alarm stands. Acknowledging twice is no error.
-  Result<Alarm> acknowledge(std::string_view id, std::string_view by);
+  /// The alarm of this id and mission (absent: of the server). Errors: not_found when no such alarm stands.
+  /// Acknowledging twice is no error.
+  Result<Alarm> acknowledge(std::string_view id, const std::optional<MissionId>& mission,
+                            std::string_view by);
   /// By priority, then time.
   std::vector<Alarm> standing() const;
 

@@ -7,6 +7,7 @@
 #include "api/kit/router.hpp"
 #include "api/kit/support.hpp"
 #include "api/stream/hub.hpp"
+#include "core/base/text.hpp"
 
 namespace anchord::api {
 namespace {
@@ -15,6 +16,27 @@ using Ordered = nlohmann::ordered_json;
 
 std::optional<SiteId> site_of(const AdminApi& s, const Alarm& alarm) {
   return alarm.condition.mission ? s.hub.site_of(*alarm.condition.mission) : std::nullopt;
+}
+
+/// The mission of the alarm of this id that is meant, nothing for one of the server. 404 where none stands
+/// that concerns who asks; 409 where several do and the request names no mission: nobody silences what they
+/// may not have seen.
+std::optional<MissionId> alarm_meant(const AdminApi& s, const std::string& id,
+                                     const std::optional<MissionId>& named) {
+  std::vector<AlarmCondition> meant;
+  for (const auto& alarm : s.alarms.standing()) {
+    const auto& c = alarm.condition;
+    if (c.id == id && (!named || c.mission == named) && concerns(alarm, site_of(s, alarm), current_sites()))
+      meant.push_back(c);
+  }
+  if (meant.empty()) throw_problem(404, "not-found", "there is no active alarm " + to_utf8(id, 60));
+  if (meant.size() > 1) {
+    std::string flights;
+    for (const auto& c : meant) flights += (flights.empty() ? "" : "; ") + c.text;
+    throw_problem(409, "conflict",
+                  "several flights have the alarm " + id + ": name one as \"mission\" (" + flights + ')');
+  }
+  return meant.front().mission;
 }
 
 }  // namespace
@@ -36,14 +58,18 @@ void add_alarm_routes(Router& router, AdminApi& s) {
          std::vector<FieldError> errors;
          Fields fields(body, "", errors);
          const auto note = fields.text("note", 500).value_or("");
+         std::optional<MissionId> named;
+         if (const auto text = fields.text("mission", 36)) {
+           if (const auto uuid = parse_uuid(*text))
+             named = MissionId{uuid.value()};
+           else
+             fields.error("mission", "bad_id", "is not the id of a mission");
+         }
          fields.finish();
          refuse_if_any(errors);
          const std::string& id = request.params.at("id");
-         for (const auto& alarm : s.alarms.standing()) {
-           if (alarm.condition.id == id && !concerns(alarm, site_of(s, alarm), current_sites()))
-             return problem(404, "not-found", "no alarm " + id + " stands");
-         }
-         const auto alarm = value_or_problem(s.alarms.acknowledge(id, request.principal.name));
+         const auto mission = alarm_meant(s, id, named);
+         const auto alarm = value_or_problem(s.alarms.acknowledge(id, mission, request.principal.name));
          s.audit.soon(request, "alarm.ack " + alarm.condition.id + (note.empty() ? "" : " note: " + note));
          return json_response(200, Ordered::parse(alarm_json(alarm)));
        },

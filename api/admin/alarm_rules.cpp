@@ -14,7 +14,8 @@ constexpr double k_skew_s = 0.05;
 constexpr std::uint64_t k_low_bytes = 2ULL << 30, k_refuse_bytes = 500ULL << 20;
 // Two seconds of the fastest ingest: what a writer that keeps up never lets wait.
 constexpr std::uint64_t k_many_rows = 40'000;
-constexpr double k_over_s = 30;
+// From where on silence of both may be the end of a flight that nobody finished; nothing here can know.
+constexpr double k_perhaps_over_s = 30;
 
 double silence_s(const std::optional<SteadyTime>& arrival, SteadyTime now) {
   return arrival ? seconds_between(*arrival, now) : 1e9;
@@ -30,7 +31,13 @@ void rtk(const FlightPulse& f, std::vector<AlarmCondition>& out) {
       !f.newest_fix || !f.newest_range || seconds_between(*f.newest_fix, *f.newest_range) > k_lost_s;
   const bool nothing = silence_s(f.range_arrival, f.now) > k_silent_ranges_s;
   if (f.newest_fix && fixes_s > k_lost_s && (behind || nothing)) {
-    out.push_back({"rtk.lost", AlarmPriority::critical, f.name + ": no position from the rover", f.mission});
+    const bool perhaps_over = std::min(fixes_s, silence_s(f.range_arrival, f.now)) > k_perhaps_over_s;
+    out.push_back(
+        {"rtk.lost", AlarmPriority::critical,
+         f.name + (perhaps_over ? ": no positions and no ranges; check power and cables of rover and tag, or "
+                                  "finish the flight if it is over"
+                                : ": no position from the rover"),
+         f.mission});
   } else if (holds_for(f.below_float_since, f.newest_fix, k_lost_s)) {
     out.push_back({"rtk.lost", AlarmPriority::critical, f.name + ": RTK lost, ranges are stored but not used",
                    f.mission});
@@ -104,18 +111,11 @@ std::vector<AlarmCondition> alarm_conditions(const std::vector<FlightPulse>& fli
   }
   for (const auto& f : flights) {
     if (!f.as_it_happens) continue;
-    if (std::min(silence_s(f.fix_arrival, f.now), silence_s(f.range_arrival, f.now)) > k_over_s) continue;
     rtk(f, out);
     ranges(f, out);
     clock(f, out);
   }
-  // One row per id: the page and its operator think in ids.
-  std::vector<AlarmCondition> one_each;
-  for (auto& condition : out) {
-    const auto same = std::ranges::find(one_each, condition.id, &AlarmCondition::id);
-    if (same == one_each.end()) one_each.push_back(std::move(condition));
-  }
-  return one_each;
+  return out;
 }
 
 }  // namespace anchord::api

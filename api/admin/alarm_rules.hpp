@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "core/base/enum_table.hpp"
@@ -21,11 +22,14 @@ inline constexpr auto k_alarm_priority_words =
 
 /// A condition that holds, in words. The text has no running numbers: it would change each second.
 struct AlarmCondition {
-  std::string id;  ///< of dashboard.md section 6
+  std::string id;  ///< of dashboard.md section 6; with the mission it is the alarm's key
   AlarmPriority priority{AlarmPriority::warning};
   std::string text;
   std::optional<MissionId> mission{};
   bool of_sites{false};  ///< its text names what is of several sites
+  bool is(std::string_view an_id, const std::optional<MissionId>& of) const {
+    return id == an_id && mission == of;
+  }
 };
 
 struct ServerPulse {
@@ -40,9 +44,9 @@ struct ServerPulse {
   std::string unrecorded{};         ///< why raw bytes of the devices are not recorded; empty: they are
 };
 
-/// Every condition that holds (dashboard.md section 6, reliability.md section 2). Pure. Of several flights
-/// the worst word of each id counts; flights that are uploaded or replayed fast raise nothing, and neither
-/// does one that fell silent more than 30 s ago: it is over, whatever its state says.
+/// Every condition that holds (dashboard.md section 6, reliability.md section 2), of each flight its own: an
+/// id at most once for each mission. Pure. Flights that are uploaded or replayed fast raise nothing. Silence
+/// ends no alarm: one stands until measurements come, or the flight is finished.
 std::vector<AlarmCondition> alarm_conditions(const std::vector<FlightPulse>& flights,
                                              const ServerPulse& server);
 

@@ -248,7 +248,7 @@ Response transform(AnchorApi& s, const Request& request) {
     if (!site || !site->projected_epsg) {
       errors.push_back({"/site", "no_epsg", "give a site with projected_epsg"});
     } else {
-      const auto projection = s.geo.projection(*site->projected_epsg, site->crs_frame);
+      const auto projection = s.geo.projection(*site->projected_epsg, *site);
       if (projection)
         context.projection = projection.value();
       else

@@ -6,13 +6,13 @@ namespace anchord::api {
 
 // Files are opened without the lock: of two who ask at once both open, and the first stays.
 
-const Result<Projection>& GeoService::opened(int epsg, int geographic_epsg) {
-  const std::pair key{epsg, geographic_epsg};
+const Result<Projection>& GeoService::opened(const OpenedKey& key) {
   {
     const auto known = opened_.lock();
     if (const auto at = known->projections.find(key); at != known->projections.end()) return at->second;
   }
-  auto now = Projection::open(epsg, geographic_epsg);
+  const auto& [epsg, geographic_epsg, epoch_year] = key;
+  auto now = Projection::open(epsg, geographic_epsg, epoch_year);
   auto known = opened_.lock();
   return known->projections.try_emplace(key, std::move(now)).first->second;
 }
@@ -30,14 +30,15 @@ const Result<Geoid>& GeoService::opened_geoid() {
   return *geoid;
 }
 
-Result<const Projection*> GeoService::projection(int epsg, const std::string& datum) {
+Result<const Projection*> GeoService::projection(int epsg, const Site& site) {
+  const std::string& datum = site.crs_frame;
   if (datum.empty())
     return make_error(Errc::invalid_argument, "the datum of the base is not stated (crs.frame of the site)");
   const auto geographic = geographic_epsg(datum);
   if (!geographic)
     return make_error(Errc::unsupported,
                       "the datum '" + to_utf8(datum, 40) + "' is not known to this server");
-  const auto& found = opened(epsg, *geographic);
+  const auto& found = opened({epsg, *geographic, site.crs_epoch ? site.crs_epoch : stated_epoch_year(datum)});
   if (!found) return found.error();
   return &found.value();
 }
@@ -45,7 +46,7 @@ Result<const Projection*> GeoService::projection(int epsg, const std::string& da
 Result<GeoService::Projected> GeoService::projected(const std::optional<Site>& site, const Wgs84& at) {
   if (!site || !site->projected_epsg)
     return make_error(Errc::not_found, "no EPSG code is set (projected_epsg of the site)");
-  BOOST_OUTCOME_TRY(const auto* map, this->projection(*site->projected_epsg, site->crs_frame));
+  BOOST_OUTCOME_TRY(const auto* map, this->projection(*site->projected_epsg, *site));
   BOOST_OUTCOME_TRY(const auto place, map->easting_northing_m(at));
   return Projected{*site->projected_epsg, place};
 }

@@ -4,7 +4,7 @@
 #include <map>
 #include <optional>
 #include <string>
-#include <utility>
+#include <tuple>
 
 #include "core/base/locked.hpp"
 #include "core/geo/geoid.hpp"
@@ -28,7 +28,8 @@ class GeoService {
   /// Errors say what is missing: no EPSG code, a base whose datum is not stated (a shift of up to a metre
   /// would be guessed), a place outside the map.
   Result<Projected> projected(const std::optional<Site>& site, const Wgs84& at);
-  Result<const Projection*> projection(int epsg, const std::string& datum);
+  /// Of positions in the frame and at the epoch that the site states.
+  Result<const Projection*> projection(int epsg, const Site& site);
 
   struct Orthometric {
     double height_m{};
@@ -37,12 +38,14 @@ class GeoService {
   Result<Orthometric> orthometric(const Wgs84& at);
 
  private:
+  /// EPSG codes of the map and of the geographic system, and the epoch.
+  using OpenedKey = std::tuple<int, int, std::optional<double>>;
   /// Only ever added to, so that what was found stays where it is; both are thread-safe themselves.
   struct Opened {
-    std::map<std::pair<int, int>, Result<Projection>> projections;
+    std::map<OpenedKey, Result<Projection>> projections;
     std::optional<Result<Geoid>> geoid;
   };
-  const Result<Projection>& opened(int epsg, int geographic_epsg);
+  const Result<Projection>& opened(const OpenedKey& key);
   const Result<Geoid>& opened_geoid();
 
   const std::string geoid_folder_;

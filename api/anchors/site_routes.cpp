@@ -37,8 +37,9 @@ Response list(AnchorApi& s, const Request& request) {
 /// A code that no export could use is refused where it is given; whether the base's datum leads to it is not
 /// asked yet, for that may be stated later.
 void check_map(GeoService& geo, const Site& site, std::vector<FieldError>& errors) {
-  const std::string datum = geographic_epsg(site.crs_frame) ? site.crs_frame : "WGS84";
-  const auto map = geo.projection(*site.projected_epsg, datum);
+  Site known = site;
+  if (!geographic_epsg(site.crs_frame)) known.crs_frame = "WGS84";
+  const auto map = geo.projection(*site.projected_epsg, known);
   if (map && map.value()->unusable().empty()) return;
   if (!map && map.error().code == Errc::unsupported) return;
   errors.push_back({"/projected_epsg", "not_usable", map ? map.value()->unusable() : map.error().message});

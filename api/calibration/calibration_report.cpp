@@ -19,7 +19,18 @@ using Json = nlohmann::json;
 
 namespace {
 
-std::string short_id(const std::string& id) { return id.substr(0, 8); }
+std::string loss_words(const std::string& loss) {
+  if (loss == "none") return "no range is left out for its residual";
+  if (loss == "huber") return "large residuals count linearly (Huber)";
+  if (loss == "cauchy") return "large residuals lose their weight (Cauchy)";
+  return "large residuals count less and the largest not at all (Tukey's biweight)";
+}
+
+/// Its last characters: the first are the time it was made, and alike for all of an afternoon (RFC 9562,
+/// version 7).
+std::string short_id(const std::string& id) {
+  return id.substr(id.size() - std::min<std::size_t>(8, id.size()));
+}
 
 std::string number(double value, int decimals) {
   char text[48];
@@ -113,21 +124,21 @@ void describe(Report& report, const std::vector<Mission>& missions, const std::s
                            " ranges and " + std::to_string(fixes) + " positions of the tag; " +
                            std::to_string(used) + " ranges are used.");
   const Json settings = Json::parse(settings_json, nullptr, false);
-  const auto word = [&](const char* key, const char* usual) {
-    return settings.is_object() && settings.contains(key) && settings[key].is_string()
-               ? settings[key].get<std::string>()
-               : std::string(usual);
-  };
   const bool plane = settings.is_object() && settings.value("dims", Json()) == 2;
-  std::string loss = "tukey";
-  if (settings.is_object() && settings.contains("loss") && settings["loss"].is_object())
-    loss = settings["loss"].value("type", loss);
+  std::string loss = "tukey", weights = "inverse_variance";
+  if (settings.is_object()) {
+    weights = settings.value("weights", weights);
+    if (settings.contains("loss") && settings["loss"].is_object())
+      loss = settings["loss"].value("type", loss);
+  }
   report.methods.push_back(
       std::string(
           "Positions, range bias, range curve, time lag and antenna offset are solved together by robust "
           "weighted least squares in ") +
-      (plane ? "the plane" : "three dimensions") + " (weights " + word("weights", "inverse_variance") +
-      ", loss " + loss + ", scale from the residuals). Covariances are scaled by the residuals.");
+      (plane ? "the plane" : "three dimensions") +
+      (weights == "dissertation" ? ". Ranges are weighted as the dissertation prints it (7.2.3); "
+                                 : ". Ranges are weighted by the inverse of their variance; ") +
+      loss_words(loss) + "; their scale is that of the residuals, and so is that of the covariances.");
   report.methods.emplace_back(
       "95 % regions: Gaussian, from the scaled covariance with at least 4 cm per axis for errors that no "
       "residual shows.");

@@ -342,7 +342,7 @@ Response report(CalibrationApi& s, const Request& request) {
   const auto page = value_or_problem(calibration_report(s, calibration));
   Response response = html_page(report_html(page));
   response.header("Content-Disposition",
-                  "inline; filename=\"calibration-" + to_string(calibration.id).substr(0, 8) + ".html\"");
+                  "inline; filename=\"calibration-" + to_string(calibration.id).substr(28) + ".html\"");
   return response;
 }
 
@@ -360,7 +360,7 @@ Response starnet(CalibrationApi& s, const Calibration& calibration, const Eviden
   response.body = listing.value();
   response.header("Content-Type", "text/plain; charset=utf-8");
   response.header("Content-Disposition",
-                  "attachment; filename=\"calibration-" + to_string(calibration.id).substr(0, 8) + ".dat\"");
+                  "attachment; filename=\"calibration-" + to_string(calibration.id).substr(28) + ".dat\"");
   return response;
 }
 

@@ -87,12 +87,12 @@ std::string accuracy(const Report& r) {
   std::string out = "<div class=\"acc\">";
   out += block(published ? "Anchors published" : "Anchors that pass every gate", std::to_string(taken),
                "of " + std::to_string(r.anchors.size()));
-  out += block("95 % horizontal, to the base", taken > 0 ? fixed(worst_m, 3) : "–", "m worst");
+  out += block("95 % horizontal, to the base", taken > 0 ? fixed(worst_m, 3) : "–", "m, of the worst anchor");
   const bool base = r.site && r.site->base_sigma_m && r.frame == TrackFrame::wgs84;
   // 95 % of the base's own error in the plane is 2.4477 sigma.
   out += block("95 % horizontal, absolute",
                base && taken > 0 ? fixed(std::hypot(worst_m, 2.4477 * *r.site->base_sigma_m), 3) : "–",
-               "m worst");
+               "m, of the worst anchor");
   out += "<div><p><b>Two accuracies.</b> The first is to the base station. The second adds the base";
   out += base ? ", with σ " + fixed(*r.site->base_sigma_m * 1000, 0) + " mm" +
                     (r.site->crs_frame.empty() ? "" : " in " + html_text(r.site->crs_frame)) + ".</p></div>"

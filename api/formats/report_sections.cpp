@@ -131,21 +131,34 @@ std::string gate_number(double value, double limit, const GateWords& words) {
   return fixed(value, words.unit.empty() ? 0 : limit >= 10 ? 1 : 2);
 }
 
+std::string gate_limit(const Gate& gate, const GateWords& words) {
+  return (words.least ? "≥ " : "≤ ") + gate_number(gate.limit, gate.limit, words) +
+         (words.unit.empty() ? "" : " " + std::string(words.unit));
+}
+
+/// One limit where all anchors have the same, else each beside its value.
 std::string gate_row(std::span<const ReportAnchor> anchors, const std::string& name) {
   const GateWords words = words_of(name);
-  std::string cells, limit = "–";
-  for (const auto& anchor : anchors) {
+  const auto gate_of = [&](const ReportAnchor& anchor) -> const Gate* {
     const auto gate = std::ranges::find(anchor.estimate.gates, name, &Gate::name);
-    if (gate == anchor.estimate.gates.end()) {
+    return gate == anchor.estimate.gates.end() ? nullptr : &*gate;
+  };
+  std::set<std::string> limits;
+  for (const auto& anchor : anchors)
+    if (const auto* gate = gate_of(anchor)) limits.insert(gate_limit(*gate, words));
+  std::string cells;
+  for (const auto& anchor : anchors) {
+    const auto* gate = gate_of(anchor);
+    if (gate == nullptr) {
       cells += cell("–", "num mut");
       continue;
     }
-    limit = (words.least ? "≥ " : "≤ ") + gate_number(gate->limit, gate->limit, words) +
-            (words.unit.empty() ? "" : " " + std::string(words.unit));
-    cells +=
-        cell((gate->passed ? "" : "✕ ") + (gate->value ? gate_number(*gate->value, gate->limit, words) : "–"),
-             gate->passed ? "num" : "num bad");
+    std::string text = (gate->passed ? "" : "✕ ") +
+                       (gate->value ? gate_number(*gate->value, gate->limit, words) : std::string("–"));
+    if (limits.size() > 1) text += " (" + gate_limit(*gate, words) + ')';
+    cells += cell(text, gate->passed ? "num" : "num bad");
   }
+  const std::string limit = limits.empty() ? "–" : limits.size() > 1 ? "each its own" : *limits.begin();
   return "<tr><td>" + html_text(spaced(std::string(words.asks))) + "</td>" + cell(limit, "num mut") + cells +
          "</tr>";
 }

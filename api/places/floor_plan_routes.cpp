@@ -163,10 +163,14 @@ void place(PlaceApi& s, Floor& floor, const Georeference& georeference, const st
   floor.proposal = {};
 }
 
+SiteDatum datum_of(const Site& site) {
+  return {site.crs_frame, site.crs_epoch ? site.crs_epoch : stated_epoch_year(site.crs_frame)};
+}
+
 /// Where a site is in its map system; nothing where it has none, or lies outside of it.
 std::optional<Eigen::Vector2d> on_map_m(const Site& site) {
   if (!site.projected_epsg || !site.origin) return std::nullopt;
-  const auto map = map_of(*site.projected_epsg, site.crs_frame);
+  const auto map = map_of(*site.projected_epsg, datum_of(site));
   if (!map) return std::nullopt;
   const auto at = map.value().easting_northing_m(*site.origin);
   return at ? std::optional(at.value()) : std::nullopt;
@@ -221,7 +225,7 @@ Response put_plan(PlaceApi& s, const Request& request) {
   value_or_problem(s.places.keep(floor.id, *floor.preview, preview));
   if (const auto tags = drawn ? tags_of_drawing(*drawn, site) : head.geo) {
     const auto by_tags = by_map(*tags, drawn ? "drawing" : "geotiff", head.width_px, head.height_px,
-                                site.origin, site.crs_frame);
+                                site.origin, datum_of(site));
     // Tags of a system that is not known here leave the plan to be clicked.
     if (by_tags) place(s, floor, by_tags.value(), picture);
   }
@@ -318,7 +322,7 @@ Response put_georeference(PlaceApi& s, const Request& request) {
   if (!try_out || from_tags) bytes = value_or_problem(s.places.bytes(floor.plan->id));
   if (from_tags) tags = head_of(bytes).geo;
   const auto found =
-      read_georeference(body, tags, floor.plan->width_px, floor.plan->height_px, site.origin, site.crs_frame);
+      read_georeference(body, tags, floor.plan->width_px, floor.plan->height_px, site.origin, datum_of(site));
   if (try_out) {
     floor.georeference = found.document;
     floor.backdrop.reset();

@@ -20,7 +20,6 @@ using floor_plan::PixelPair;
 namespace {
 
 constexpr std::size_t k_max_points = 100;
-constexpr int k_wgs84_3d = 4979, k_etrs89_3d = 4937;
 
 Ordered pair_json(const Eigen::Vector2d& v) { return {v.x(), v.y()}; }
 
@@ -158,16 +157,15 @@ std::optional<GeoTags> read_world_file(Fields& fields) {
 
 }  // namespace
 
-Result<Projection> map_of(int epsg, const std::string& datum) {
-  if (const auto known = geographic_epsg(datum)) return Projection::open(epsg, *known);
-  auto opened = Projection::open(epsg, k_wgs84_3d);
-  if (opened || opened.error().code != Errc::unsupported) return opened;
-  return Projection::open(epsg, k_etrs89_3d);
+Result<Projection> map_of(int epsg, const SiteDatum& datum) {
+  if (const auto known = geographic_epsg(datum.frame))
+    return Projection::open(epsg, *known, datum.epoch_year);
+  return Projection::open_own(epsg);
 }
 
 Result<Georeference> by_map(const GeoTags& tags, std::string_view source, std::int64_t width_px,
                             std::int64_t height_px, const std::optional<Wgs84>& site_origin,
-                            const std::string& datum) {
+                            const SiteDatum& datum) {
   std::optional<Projection> projection;
   if (!tags.geographic) {
     BOOST_OUTCOME_TRY(auto opened, map_of(tags.epsg, datum));
@@ -211,7 +209,7 @@ Result<Georeference> by_map(const GeoTags& tags, std::string_view source, std::i
 
 Georeference read_georeference(const Json& body, const std::optional<GeoTags>& tags, std::int64_t width_px,
                                std::int64_t height_px, const std::optional<Wgs84>& site_origin,
-                               const std::string& datum) {
+                               const SiteDatum& datum) {
   std::vector<FieldError> errors;
   Fields fields(body, "", errors);
   if (const Json* points = fields.child("points"))

@@ -5,10 +5,13 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
+#include <charconv>
 #include <cmath>
+#include <cstdio>
 #include <utility>
 
 #include "core/base/locked.hpp"
+#include "core/geo/network_datum.hpp"
 
 namespace anchord {
 
@@ -30,23 +33,18 @@ struct Transformation {
   PJ* operation{nullptr};
 };
 
-struct Datum {
-  std::string_view word;
-  int epsg;
-};
-/// Geographic 3D systems of the EPSG registry; words without capitals, blanks and hyphens.
-constexpr std::array k_datums{Datum{"wgs84", 4979},     Datum{"etrs89", 4937},      Datum{"etrf2000", 7931},
-                              Datum{"itrf2008", 7911},  Datum{"itrf2014", 7912},    Datum{"itrf2020", 9989},
-                              Datum{"igs14", 9018},     Datum{"nad83(2011)", 6319}, Datum{"gda94", 4939},
-                              Datum{"gda2020", 7843},   Datum{"jgd2011", 6667},     Datum{"nzgd2000", 4959},
-                              Datum{"sirgas2000", 4988}};
-
 struct Owned {
   PJ* pj;
   ~Owned() {
     if (pj != nullptr) proj_destroy(pj);
   }
 };
+
+/// As of tracks (source_crs): beyond it map coordinates would be wrong by more than anchors are.
+constexpr double k_max_datum_error_m = 0.5;
+/// A frame that moves shows it between these years; plates move by up to 0.1 m a year.
+constexpr std::array k_years{2010.0, 2030.0};
+constexpr double k_max_unstated_move_m = 0.02, k_metres_a_degree = 111'195;
 
 std::string code(int epsg) { return "EPSG:" + std::to_string(epsg); }
 
@@ -78,7 +76,48 @@ std::string not_metres_east_north(PJ_CONTEXT* context, const PJ* crs, const std:
 struct Projection::Pipeline {
   Locked<Transformation> transformation;
   std::string unusable;  ///< why no easting and northing in metres comes of it
+  std::string name;
+  double epoch_year{HUGE_VAL};  ///< of the latitudes and longitudes; HUGE_VAL: not stated
+  Result<PJ_COORD> transformed(PJ_DIRECTION direction, PJ_COORD from);
 };
+
+/// Errors of the change of datum are asked for at the place: grids and parameters have areas.
+Result<PJ_COORD> Projection::Pipeline::transformed(PJ_DIRECTION direction, PJ_COORD from) {
+  const auto use = transformation.lock();
+  const auto at = [&](double year) {
+    from.xyzt.t = year;
+    return proj_trans(use->operation, direction, from);
+  };
+  const PJ_COORD out = at(epoch_year);
+  if (!std::isfinite(out.xy.x) || !std::isfinite(out.xy.y)) {
+    proj_errno_reset(use->operation);
+    return make_error(Errc::invalid_argument, "the position is outside " + name);
+  }
+  const Owned taken{proj_trans_get_last_used_operation(use->operation)};
+  const double error_m =
+      proj_coordoperation_get_accuracy(use->context, taken.pj != nullptr ? taken.pj : use->operation);
+  if (error_m > k_max_datum_error_m) {
+    char text[160];
+    std::snprintf(text, sizeof text,
+                  "with the grids installed the change of datum to %.60s has an error of %.2g m here "
+                  "(limit %.2g m)",
+                  name.c_str(), error_m, k_max_datum_error_m);
+    return make_error(Errc::unsupported, std::string(text) +
+                                             ": install the grid of that country for PROJ, or name the "
+                                             "frame that the base station works in (crs.frame)");
+  }
+  if (epoch_year != HUGE_VAL) return out;
+  const PJ_COORD then = at(k_years[0]), later = at(k_years[1]);
+  // Degrees one way, metres the other: what does not move is the same to the last digits in both.
+  const double moved_m = std::hypot(later.xy.x - then.xy.x, later.xy.y - then.xy.y) *
+                         (direction == PJ_FWD ? 1 : k_metres_a_degree);
+  if (moved_m > k_max_unstated_move_m)
+    return make_error(
+        Errc::unsupported,
+        "the frame of the base moves against " + name +
+            ": state the epoch of its positions (crs.epoch of the site, a year such as 2026.5)");
+  return out;
+}
 
 std::optional<int> geographic_epsg(std::string_view datum) {
   std::string word;
@@ -86,10 +125,19 @@ std::optional<int> geographic_epsg(std::string_view datum) {
     if (c != ' ' && c != '-' && c != '_')
       word += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
   }
-  for (const auto& known : k_datums) {
-    if (word == known.word) return known.epsg;
+  for (const auto& known : k_network_datums) {
+    if (word == known.word) return known.full_epsg;
   }
   return std::nullopt;
+}
+
+std::optional<double> stated_epoch_year(std::string_view datum) {
+  const auto open = datum.find(" (");
+  if (open == std::string_view::npos) return std::nullopt;
+  double year = 0;
+  const auto [end, fault] = std::from_chars(datum.data() + open + 2, datum.data() + datum.size(), year);
+  const bool whole = fault == std::errc{} && std::string_view(end, datum.data() + datum.size()) == ")";
+  return whole && year >= 1900 && year <= 2200 ? std::optional(year) : std::nullopt;
 }
 
 Projection::Projection(int epsg, std::string name, std::unique_ptr<Pipeline> pipeline)
@@ -98,7 +146,7 @@ Projection::Projection(Projection&&) noexcept = default;
 Projection& Projection::operator=(Projection&&) noexcept = default;
 Projection::~Projection() = default;
 
-Result<Projection> Projection::open(int epsg, int geographic_epsg) {
+Result<Projection> Projection::open(int epsg, int geographic_epsg, std::optional<double> epoch_year) {
   auto pipeline = std::make_unique<Pipeline>();
   auto made = pipeline->transformation.lock();
   PJ_CONTEXT* context = made->context;
@@ -126,31 +174,40 @@ Result<Projection> Projection::open(int epsg, int geographic_epsg) {
   made->operation = proj_normalize_for_visualization(context, found.pj);
   if (made->operation == nullptr) return make_error(Errc::unsupported, name + ": its axes are not supported");
   pipeline->unusable = not_metres_east_north(context, target.pj, name);
+  pipeline->name = name;
+  if (epoch_year) pipeline->epoch_year = *epoch_year;
   return Projection(epsg, std::move(name), std::move(pipeline));
+}
+
+Result<Projection> Projection::open_own(int epsg) {
+  constexpr int k_wgs84_3d = 4979, k_etrs89_3d = 4937;
+  const Transformation own;
+  const Owned target{proj_create(own.context, code(epsg).c_str())};
+  const Owned base{target.pj != nullptr ? proj_crs_get_geodetic_crs(own.context, target.pj) : nullptr};
+  for (const auto& known : k_network_datums) {
+    const Owned flat{proj_create(own.context, code(known.flat_epsg).c_str())};
+    if (base.pj != nullptr && flat.pj != nullptr &&
+        proj_is_equivalent_to_with_ctx(own.context, base.pj, flat.pj,
+                                       PJ_COMP_EQUIVALENT_EXCEPT_AXIS_ORDER_GEOGCRS) != 0)
+      return open(epsg, known.full_epsg);
+  }
+  auto opened = open(epsg, k_wgs84_3d);
+  return opened || opened.error().code != Errc::unsupported ? std::move(opened) : open(epsg, k_etrs89_3d);
 }
 
 const std::string& Projection::unusable() const { return pipeline_->unusable; }
 
 Result<Eigen::Vector2d> Projection::easting_northing_m(const Wgs84& at) const {
   if (!pipeline_->unusable.empty()) return make_error(Errc::unsupported, pipeline_->unusable);
-  const auto use = pipeline_->transformation.lock();
-  const PJ_COORD out =
-      proj_trans(use->operation, PJ_FWD, proj_coord(at.lon_deg, at.lat_deg, at.height_m, HUGE_VAL));
-  if (!std::isfinite(out.xy.x) || !std::isfinite(out.xy.y)) {
-    proj_errno_reset(use->operation);
-    return make_error(Errc::invalid_argument, "the position is outside " + name_);
-  }
+  BOOST_OUTCOME_TRY(const PJ_COORD out, pipeline_->transformed(PJ_FWD, proj_coord(at.lon_deg, at.lat_deg,
+                                                                                  at.height_m, HUGE_VAL)));
   return Eigen::Vector2d(out.xy.x, out.xy.y);
 }
 
 Result<Wgs84> Projection::geographic(const Eigen::Vector2d& easting_northing_m, double height_m) const {
-  const auto use = pipeline_->transformation.lock();
-  const PJ_COORD out = proj_trans(
-      use->operation, PJ_INV, proj_coord(easting_northing_m.x(), easting_northing_m.y(), height_m, HUGE_VAL));
-  if (!std::isfinite(out.xy.x) || !std::isfinite(out.xy.y)) {
-    proj_errno_reset(use->operation);
-    return make_error(Errc::invalid_argument, "the position is outside " + name_);
-  }
+  BOOST_OUTCOME_TRY(const PJ_COORD out,
+                    pipeline_->transformed(PJ_INV, proj_coord(easting_northing_m.x(), easting_northing_m.y(),
+                                                              height_m, HUGE_VAL)));
   return Wgs84{out.xy.y, out.xy.x, height_m};
 }
 

@@ -11,20 +11,12 @@
 
 #include "core/base/locked.hpp"
 #include "core/geo/enu.hpp"
+#include "core/geo/network_datum.hpp"
 
 namespace anchord {
 
 namespace {
 
-struct OwnDatum {
-  int flat_epsg, full_epsg;  ///< geographic, without and with heights
-};
-/// Where positions are taken as they are: each is what an RTK network of its region gives.
-constexpr std::array k_own_datums{OwnDatum{4326, 4979}, OwnDatum{4258, 4937}, OwnDatum{9067, 7931},
-                                  OwnDatum{8999, 7911}, OwnDatum{9000, 7912}, OwnDatum{9990, 9989},
-                                  OwnDatum{9019, 9018}, OwnDatum{6318, 6319}, OwnDatum{4283, 4939},
-                                  OwnDatum{7844, 7843}, OwnDatum{6668, 6667}, OwnDatum{4167, 4959},
-                                  OwnDatum{4674, 4988}};
 /// To which others are changed, whichever PROJ does with the smaller error.
 constexpr std::array k_targets{4937, 4979};
 /// Beyond the area of a system its numbers are those of another zone, or easting for northing.
@@ -194,7 +186,7 @@ Result<void> SourceCrs::find_horizontal(Operations& of, PJ* crs, const SourceCrs
     datum_ = name_of(to.pj);
     of.horizontal = std::move(found);
   };
-  for (const auto& own : k_own_datums) {
+  for (const auto& own : k_network_datums) {
     const ProjHandle flat{proj_create(of.context, epsg_text(own.flat_epsg).c_str())};
     if (base.pj != nullptr && flat.pj != nullptr &&
         proj_is_equivalent_to_with_ctx(of.context, base.pj, flat.pj,
@@ -273,8 +265,9 @@ Result<void> SourceCrs::prepare(const SourceCrsSpec& spec, const Eigen::Vector3d
   if (!projected_ && !geocentric_ && type != PJ_TYPE_GEOGRAPHIC_2D_CRS && type != PJ_TYPE_GEOGRAPHIC_3D_CRS)
     return make_error(Errc::invalid_argument, shown + " is not a coordinate system of positions");
   // Heights go their own way.
-  const auto own = std::ranges::find(k_own_datums, *epsg, &OwnDatum::full_epsg);
-  if (own != k_own_datums.end()) crs = ProjHandle(proj_create(context, epsg_text(own->flat_epsg).c_str()));
+  const auto own = std::ranges::find(k_network_datums, *epsg, &NetworkDatum::full_epsg);
+  if (own != k_network_datums.end())
+    crs = ProjHandle(proj_create(context, epsg_text(own->flat_epsg).c_str()));
   const ProjHandle conversion{projected_ ? proj_crs_get_coordoperation(context, crs.pj) : nullptr};
   const char* method = nullptr;
   if (conversion.pj != nullptr)

@@ -94,14 +94,22 @@ TEST(AlarmRules, CallClocksThatDifferBeyondDoubt) {
   EXPECT_EQ(raised(f), "") << "within what the flight can tell";
 }
 
-TEST(AlarmRules, SayNothingOfUploadsAndOfFlightsThatAreOver) {
+TEST(AlarmRules, SayNothingOfUploads) {
   auto f = well();
   f.below_float_since = at(0);
   f.as_it_happens = false;
   EXPECT_EQ(raised(f), "");
-  f.as_it_happens = true;
+}
+
+// A hub that came loose takes rover and tag at once: nothing recovered, so nothing is over.
+TEST(AlarmRules, StandWhileRoverAndTagAreSilentHoweverLong) {
+  auto f = well();
   f.now = steady(140);
-  EXPECT_EQ(raised(f), "");
+  EXPECT_EQ(raised(f), "rtk.lost uwb.none");
+  EXPECT_NE(api::alarm_conditions({f}, {})[0].text.find("finish the flight if it is over"),
+            std::string::npos);
+  f.now = steady(7'200);
+  EXPECT_EQ(raised(f), "rtk.lost uwb.none");
 }
 
 TEST(AlarmRules, CallDiskQueueAndStore) {
@@ -114,10 +122,15 @@ TEST(AlarmRules, CallDiskQueueAndStore) {
   EXPECT_EQ(raised(well(), {.reason = "no write for 7 s", .stalled = true}), "storage.stalled");
 }
 
-TEST(AlarmRules, GiveEachIdOnceForSeveralFlights) {
-  auto f = well();
-  f.below_float_since = at(0);
-  EXPECT_EQ(api::alarm_conditions({f, f}, {}).size(), 1u);
+TEST(AlarmRules, AreOfEachFlight) {
+  auto north = well(), south = well();
+  north.mission = MissionId{make_uuid_v7(at(1))};
+  south.mission = MissionId{make_uuid_v7(at(2))};
+  north.below_float_since = south.below_float_since = at(0);
+  const auto conditions = api::alarm_conditions({north, south}, {});
+  ASSERT_EQ(conditions.size(), 2u);
+  EXPECT_EQ(conditions[0].mission, north.mission);
+  EXPECT_EQ(conditions[1].mission, south.mission);
 }
 
 /// Ten looks, one a second of ours, while the flight's time passes at this speed.
@@ -195,15 +208,29 @@ TEST_F(Alarms, StandUntilTheirConditionEndsAndAreEventsOnce) {
 TEST_F(Alarms, AreQuietOnceAcknowledgedUntilTheyGetWorse) {
   api::AlarmCondition low{"disk.low", AlarmPriority::warning, "less than 2 GiB", {}};
   board_.update({low}, at(1));
-  EXPECT_EQ(board_.acknowledge("disk.high", "me").error().code, Errc::not_found);
-  ASSERT_TRUE(board_.acknowledge("disk.low", "me"));
-  ASSERT_TRUE(board_.acknowledge("disk.low", "me"));
+  EXPECT_EQ(board_.acknowledge("disk.high", {}, "me").error().code, Errc::not_found);
+  ASSERT_TRUE(board_.acknowledge("disk.low", {}, "me"));
+  ASSERT_TRUE(board_.acknowledge("disk.low", {}, "me"));
   board_.update({low}, at(2));
   EXPECT_TRUE(board_.standing()[0].acknowledged);
   low.text = "less than 500 MiB";
   board_.update({low}, at(3));
   EXPECT_FALSE(board_.standing()[0].acknowledged);
   EXPECT_EQ(codes(), "alarm.raised alarm.acknowledged");
+}
+
+TEST_F(Alarms, OfTwoFlightsAreRaisedAcknowledgedAndClearedEachForItself) {
+  const MissionId north{make_uuid_v7(at(1))}, south{make_uuid_v7(at(2))};
+  const auto lost = [](const MissionId& of) {
+    return api::AlarmCondition{"rtk.lost", AlarmPriority::critical, "lost", of};
+  };
+  board_.update({lost(north), lost(south)}, at(1));
+  ASSERT_TRUE(board_.acknowledge("rtk.lost", north, "me"));
+  board_.update({lost(north), lost(south)}, at(2));
+  ASSERT_EQ(board_.standing().size(), 2u);
+  for (const auto& alarm : board_.standing()) EXPECT_EQ(alarm.acknowledged, alarm.condition.mission == north);
+  board_.update({lost(north)}, at(3));
+  EXPECT_EQ(codes(), "alarm.raised alarm.raised alarm.acknowledged alarm.cleared");
 }
 
 /// Devices of which only the clock matters here.

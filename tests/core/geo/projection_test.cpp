@@ -103,6 +103,59 @@ TEST(Projection, KnowsDatumsByTheirWordsAndNothingByGuess) {
   EXPECT_FALSE(geographic_epsg("our own").has_value());
 }
 
+TEST(Projection, ReadsTheEpochBehindADatum) {
+  EXPECT_EQ(stated_epoch_year("ITRF2014 (2026.3)"), 2026.3);
+  EXPECT_FALSE(stated_epoch_year("ITRF2014").has_value());
+  EXPECT_FALSE(stated_epoch_year("NAD83(2011)").has_value());
+  EXPECT_FALSE(stated_epoch_year("ITRF2014 (soon)").has_value());
+}
+
+// Without Ordnance Survey's grid the change from ETRS89 is metres off; a null transformation from WGS 84 is
+// up to 1 m.
+TEST(Projection, RefusesAChangeOfDatumWithAnErrorOfMoreThanHalfAMetreBothWays) {
+  const Wgs84 caister{52.6580078333, 1.7160739722, 108.05};
+  for (const auto& [epsg, geographic] : {std::pair{27700, 4937}, {31467, 4937}, {25831, 4979}}) {
+    const auto map = Projection::open(epsg, geographic);
+    ASSERT_TRUE(map.has_value()) << map.error().message;
+    const auto there = map.value().easting_northing_m(caister);
+    ASSERT_FALSE(there.has_value()) << epsg << ": " << there.value().transpose();
+    EXPECT_NE(there.error().message.find("(limit 0.5 m)"), std::string::npos) << there.error().message;
+    EXPECT_FALSE(map.value().geographic({500'000, 300'000}, 0).has_value()) << epsg;
+  }
+  EXPECT_TRUE(Projection::open(25831, 4937).value().easting_northing_m(caister).has_value());
+}
+
+TEST(Projection, TakesPositionsOfNoStatedDatumInTheOwnOneOfTheMap) {
+  const Wgs84 place{51.0231, 3.7133, 55};
+  const auto own = Projection::open_own(25831), stated = Projection::open(25831, 4937);
+  ASSERT_TRUE(own.has_value() && stated.has_value());
+  EXPECT_EQ(own.value().easting_northing_m(place).value(), stated.value().easting_northing_m(place).value());
+  EXPECT_FALSE(Projection::open_own(27700).value().easting_northing_m({52.6, 1.7, 0}).has_value());
+}
+
+// echo 51.0231 3.7133 55 2026.9 | cs2cs -d 4 EPSG:7912 EPSG:25831, of PROJ 9.1.1
+TEST(Projection, MovesPositionsOfAFrameThatMovesToTheEpochOfTheMap) {
+  const Wgs84 place{51.0231, 3.7133, 55};
+  const auto map = Projection::open(25831, 7912, 2026.9);
+  ASSERT_TRUE(map.has_value()) << map.error().message;
+  const auto at = map.value().easting_northing_m(place);
+  ASSERT_TRUE(at.has_value()) << at.error().message;
+  EXPECT_NEAR(at.value().x(), 550026.178, 1e-3);
+  EXPECT_NEAR(at.value().y(), 5652635.171, 1e-3);
+  const auto back = map.value().geographic(at.value(), 55);
+  ASSERT_TRUE(back.has_value()) << back.error().message;
+  EXPECT_NEAR(back.value().lat_deg, place.lat_deg, 1e-8);
+  EXPECT_NEAR(back.value().lon_deg, place.lon_deg, 1e-8);
+}
+
+TEST(Projection, AsksForTheEpochOfAFrameThatMoves) {
+  const auto map = Projection::open(25831, 7912);
+  ASSERT_TRUE(map.has_value()) << map.error().message;
+  const auto at = map.value().easting_northing_m({51.0231, 3.7133, 55});
+  ASSERT_FALSE(at.has_value());
+  EXPECT_NE(at.error().message.find("crs.epoch"), std::string::npos) << at.error().message;
+}
+
 /// A geoid of one height in GeographicLib's PGM format: raw = (height - offset) / scale.
 void write_geoid(const std::filesystem::path& file, double height_m) {
   std::ofstream out(file, std::ios::binary);
