@@ -279,8 +279,11 @@ Result<void> Operations::recover(const Now& now, KeptFlight kept) {
     flight_->forecast = check.value().time;
   // Not heard yet: whether the hold leaves is decided by the mode that the first heartbeat shows.
   take_events(*flight_);
-  log_event(EventLevel::critical, "procedure.restarted",
-            "server restarted in flight: hold commanded, waiting for the operator", kept.mission);
+  log_event(
+      EventLevel::critical, "procedure.restarted",
+      "server restarted in flight: on hold, waiting for the operator; an aircraft in a mode of its own or "
+      "of its pilot is left in it",
+      kept.mission);
   return boost::outcome_v2::success();
 }
 
