@@ -67,14 +67,15 @@ TEST(Projection, RefusesWhatIsNoMap) {
 // Eastings in feet, or counted west, would be taken for metres east by every drawing and table made of them.
 TEST(Projection, GivesMetresEastAndNorthOrSaysWhyNot) {
   struct Case {
-    int epsg;
+    int epsg, own_datum;
     Wgs84 at;
     const char* says;
   };
-  for (const auto& [epsg, at, says] :
-       {Case{2225, {40.5, -122.3, 0}, "counts in US survey foot"},
-        Case{2048, {-33.9, 18.4, 0}, "south and west"}, Case{5513, {50.08, 14.42, 0}, "south and west"}}) {
-    const auto map = Projection::open(epsg, 4979);
+  for (const auto& [epsg, own_datum, at, says] :
+       {Case{2225, 4269, {40.5, -122.3, 0}, "counts in US survey foot"},
+        Case{2048, 4148, {-33.9, 18.4, 0}, "south and west"},
+        Case{5513, 4156, {50.08, 14.42, 0}, "south and west"}}) {
+    const auto map = Projection::open(epsg, own_datum);
     ASSERT_TRUE(map.has_value()) << epsg << map.error().message;
     const auto got = map.value().easting_northing_m(at);
     ASSERT_FALSE(got.has_value()) << epsg << ": " << got.value().transpose();
