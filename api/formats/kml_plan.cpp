@@ -8,6 +8,8 @@
 #include <optional>
 #include <pugixml.hpp>
 
+#include "api/formats/area_kind.hpp"
+#include "api/formats/geojson_plan.hpp"
 #include "api/formats/qgc_plan.hpp"
 #include "api/formats/xml_document.hpp"
 #include "api/kit/reader.hpp"
@@ -18,25 +20,6 @@ namespace {
 
 constexpr std::size_t k_max_corners = 2000, k_max_waypoints = 1000;
 
-std::string lower(std::string_view text) {
-  std::string out(text);
-  std::transform(out.begin(), out.end(), out.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return out;
-}
-
-enum class Kind : std::uint8_t { unsaid, outline, no_fly, fence, transit };
-
-Kind kind_of(std::string_view text) {
-  const std::string word = lower(text);
-  const auto has = [&](const char* part) { return word.find(part) != std::string::npos; };
-  if (has("no_fly") || has("no-fly") || has("no fly") || has("nofly")) return Kind::no_fly;
-  if (has("fence")) return Kind::fence;
-  if (has("outline") || has("building")) return Kind::outline;
-  if (has("transit")) return Kind::transit;
-  return Kind::unsaid;
-}
-
 /// The names of the fields are not asked: those we look for tell themselves by their values.
 std::string data_of(const pugi::xml_node& placemark) {
   std::string out;
@@ -46,6 +29,20 @@ std::string data_of(const pugi::xml_node& placemark) {
       if (local_name(simple) == "SimpleData") out += ' ' + text_of(simple);
   }
   return out;
+}
+
+/// What a field called kind says.
+std::string kind_field(const pugi::xml_node& placemark) {
+  const auto is_kind = [](const pugi::xml_node& node) {
+    const std::string_view name = node.attribute("name").value();
+    return name == "kind" || name == "Kind" || name == "KIND";
+  };
+  for (const auto& data : child_of(placemark, "ExtendedData")) {
+    if (is_kind(data)) return child_text(data, "value");
+    for (const auto& simple : data)
+      if (is_kind(simple)) return text_of(simple);
+  }
+  return {};
 }
 
 struct Place {
@@ -67,10 +64,10 @@ class Reader {
 
   Plan plan;
 
-  void walk(const pugi::xml_node& node, Kind kind) {
+  void walk(const pugi::xml_node& node, std::optional<AreaKind> kind) {
     const auto name = local_name(node);
     if (name == "Folder") {
-      if (const Kind said = kind_of(child_text(node, "name")); said != Kind::unsaid) kind = said;
+      if (const auto said = area_kind_in(child_text(node, "name"))) kind = said;
     }
     if (name == "Placemark") return placemark(node, kind);
     if (name == "NetworkLink" || name == "GroundOverlay" || name == "PhotoOverlay" ||
@@ -91,23 +88,32 @@ class Reader {
     if (errors_.size() < 100) errors_.push_back({at_, code, std::move(detail) + name});
   }
 
-  void placemark(const pugi::xml_node& node, Kind folder) {
+  void placemark(const pugi::xml_node& node, std::optional<AreaKind> folder) {
     at_ = "/Placemark/" + std::to_string(n_++);
     name_ = to_utf8(child_text(node, "name"), 60);
-    Kind kind = kind_of(data_of(node));
-    if (kind == Kind::unsaid) kind = kind_of(child_text(node, "name"));
-    if (kind == Kind::unsaid) kind = folder;
+    const auto given = kind_field(node);
+    auto kind = area_kind_in(data_of(node));
+    if (!kind && !given.empty() && !(kind = area_kind(given)))
+      return fail("unknown_value",
+                  "kind must be " + std::string(k_area_kinds) + ", not " + to_utf8(given, 60));
+    if (!kind) kind = area_kind_in(child_text(node, "name"));
+    if (!kind) kind = folder;
     bool any = false;
     for (const auto& child : node) any = geometry(child, kind) || any;
+    if (!any && bounds_flight(kind)) return fail("required", "a fence or no-fly area without a polygon");
     if (!any) note(at_ + " has no point, line or polygon and was left out");
   }
 
-  bool geometry(const pugi::xml_node& node, Kind kind) {
+  bool geometry(const pugi::xml_node& node, std::optional<AreaKind> kind) {
     const auto name = local_name(node);
     if (name == "MultiGeometry") {
       for (const auto& child : node) geometry(child, kind);
     } else if (name == "Polygon") {
       polygon(node, kind);
+    } else if (bounds_flight(kind) &&
+               (name == "LineString" || name == "LinearRing" || name == "Track" || name == "MultiTrack")) {
+      fail("wrong_type",
+           "a " + std::string(name) + " bounds no area: draw the fence or no-fly area as a polygon");
     } else if (name == "Point" || name == "LineString") {
       waypoints(node, kind);
     } else if (name == "LinearRing" || name == "Model" || name == "Track" || name == "MultiTrack") {
@@ -160,10 +166,15 @@ class Reader {
     return out;
   }
 
-  void polygon(const pugi::xml_node& node, Kind kind) {
+  void polygon(const pugi::xml_node& node, std::optional<AreaKind> kind) {
     const auto ring = child_of(child_of(node, "outerBoundaryIs"), "LinearRing");
     if (!ring) return fail("required", "a Polygon needs outerBoundaryIs with a LinearRing");
-    if (child_of(node, "innerBoundaryIs")) note(at_ + " has holes, which were left out");
+    if (child_of(node, "innerBoundaryIs")) {
+      if (kind == AreaKind::fence)
+        return fail("conflict", "a fence with holes: draw each hole as a no-fly area of its own");
+      note(at_ + (kind == AreaKind::no_fly ? " has holes: the whole of the no-fly area is kept out of"
+                                           : " has courtyards, which are not flown into"));
+    }
     const auto corners = places(ring);
     if (!corners) return;
     GeoPolygon area;
@@ -172,9 +183,9 @@ class Reader {
     }
     if (area.size() > 1 && area.front() == area.back()) area.pop_back();
     if (area.size() < 3) return fail("out_of_range", "a polygon needs 3 different corners");
-    if (kind == Kind::no_fly) {
+    if (kind == AreaKind::no_fly) {
       plan.no_fly.push_back(std::move(area));
-    } else if (kind == Kind::fence) {
+    } else if (kind == AreaKind::fence) {
       if (!plan.fence.empty()) return fail("conflict", "a second fence: a plan can have only one");
       plan.fence = std::move(area);
     } else if (plan.outline.empty()) {
@@ -190,7 +201,7 @@ class Reader {
     }
   }
 
-  void waypoints(const pugi::xml_node& node, Kind kind) {
+  void waypoints(const pugi::xml_node& node, std::optional<AreaKind> kind) {
     const auto all = places(node);
     if (!all) return;
     const auto mode = child_text(node, "altitudeMode");
@@ -209,7 +220,7 @@ class Reader {
       PlanWaypoint w;
       w.at = place.at;
       w.height_m = *place.height_m;
-      w.measure = kind != Kind::transit;
+      w.measure = kind != AreaKind::transit;
       plan.waypoints.push_back(w);
     }
   }
@@ -234,7 +245,7 @@ Plan read_kml_plan(std::string_view text, std::vector<std::string>& notes, std::
     return {};
   }
   Reader reader(notes, errors);
-  reader.walk(root, Kind::unsaid);
+  reader.walk(root, {});
   if (reader.n_placemarks() == 0 && errors.empty())
     errors.push_back({"", "required", "the file has no Placemark: it contains no drawing"});
   return std::move(reader.plan);
@@ -254,7 +265,7 @@ Plan read_plan_file(std::string_view text, std::vector<std::string>& notes, std:
     return {};
   }
   const bool qgc = body.is_object() && body.value("fileType", nlohmann::json()) == "Plan";
-  return qgc ? read_qgc_plan(body, notes, errors) : read_geojson_plan(body, errors);
+  return qgc ? read_qgc_plan(body, notes, errors) : read_geojson_plan(body, notes, errors);
 }
 
 }  // namespace anchord::api

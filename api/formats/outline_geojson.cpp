@@ -3,8 +3,12 @@
 #include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <optional>
+#include <utility>
 
+#include "api/formats/area_kind.hpp"
 #include "api/kit/reader.hpp"
+#include "core/base/text.hpp"
 #include "core/geo/enu.hpp"
 
 namespace anchord::api {
@@ -21,7 +25,7 @@ class OutlineReader {
 
   struct Area {
     std::vector<Corner> corners;
-    std::string kind;
+    std::optional<AreaKind> kind;
     std::string at;
     std::optional<double> height_m;
   };
@@ -67,6 +71,8 @@ class OutlineReader {
     if (coordinates == json.end() || !coordinates->is_array() || coordinates->empty())
       return fail(at + "/coordinates", "required", "must be an array of rings of [lon, lat]");
     if (!many) return polygon(*coordinates, at + "/coordinates", std::move(area));
+    if (area.kind == AreaKind::fence && coordinates->size() > 1)
+      return fail(at, "conflict", "a fence of several parts: draw one polygon round them");
     std::vector<Corner> all;
     const std::size_t wrong = errors_.size();
     for (std::size_t i = 0; i < coordinates->size(); ++i) {
@@ -74,9 +80,9 @@ class OutlineReader {
       if (errors_.size() > wrong) continue;
       all.insert(all.end(), areas.back().corners.begin(), areas.back().corners.end());
       // Areas to keep out of stay apart; a building of several parts is flown round as one.
-      if (area.kind != "no_fly" && coordinates->size() > 1) areas.pop_back();
+      if (area.kind != AreaKind::no_fly && coordinates->size() > 1) areas.pop_back();
     }
-    if (errors_.size() > wrong || area.kind == "no_fly" || coordinates->size() == 1) return;
+    if (errors_.size() > wrong || area.kind == AreaKind::no_fly || coordinates->size() == 1) return;
     area.corners = hull(std::move(all));
     areas.push_back(std::move(area));
   }
@@ -107,6 +113,8 @@ class OutlineReader {
     if (!rings.is_array() || rings.empty() || !rings[0].is_array()) {
       return fail(at, "required", "must be an array of rings of [lon, lat]");
     }
+    if (area.kind == AreaKind::fence && rings.size() > 1)
+      return fail(at, "conflict", "a fence with holes: draw each hole as an area of its own, kind no_fly");
     const Json& ring = rings[0];  // holes (courtyards) are not flown into
     if (ring.size() < 3 || ring.size() > 10'000)
       return fail(at + "/0", "out_of_range", "needs 3 to 10000 corners");
@@ -154,7 +162,10 @@ class OutlineReader {
     const std::string base = at.substr(0, at.rfind('/')) + "/properties/";
     if (const auto kind = properties.find("kind"); kind != properties.end() && !kind->is_null()) {
       if (!kind->is_string()) return fail(base + "kind", "wrong_type", "must be a string");
-      area.kind = kind->get<std::string>();
+      area.kind = area_kind(kind->get_ref<const std::string&>());
+      if (!area.kind && *kind != "")
+        return fail(base + "kind", "unknown_value",
+                    "must be outline, no_fly or fence, not " + to_utf8(kind->dump(), 60));
     }
     if (const auto height = properties.find("height_m"); height != properties.end() && !height->is_null()) {
       if (!height->is_number() || !(height->get<double>() > 0 && height->get<double>() <= 500)) {
@@ -183,8 +194,11 @@ std::optional<OutlineRequest> read_outline(std::string_view text, std::vector<Fi
   OutlineReader reader(errors);
   reader.object(json, "", nullptr);
   const OutlineReader::Area* outline = nullptr;
+  bool fenced = false;
   for (const auto& area : reader.areas) {
-    if (area.kind == "no_fly" || area.kind == "fence") continue;
+    if (area.kind == AreaKind::fence && std::exchange(fenced, true))
+      errors.push_back({area.at, "conflict", "a second fence: draw one polygon round both"});
+    if (bounds_flight(area.kind)) continue;
     if (outline != nullptr) {
       errors.push_back(
           {area.at, "conflict", "a second building outline; mark other areas with kind no_fly or fence"});
@@ -209,8 +223,8 @@ std::optional<OutlineRequest> read_outline(std::string_view text, std::vector<Fi
   out.input.outline = metres(outline->corners);
   if (outline->height_m) out.input.building_height_m = *outline->height_m;
   for (const auto& area : reader.areas) {
-    if (area.kind == "no_fly") out.input.no_fly.push_back(metres(area.corners));
-    if (area.kind == "fence") out.input.fence = metres(area.corners);
+    if (area.kind == AreaKind::no_fly) out.input.no_fly.push_back(metres(area.corners));
+    if (area.kind == AreaKind::fence) out.input.fence = metres(area.corners);
   }
   return out;
 }

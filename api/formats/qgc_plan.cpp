@@ -14,7 +14,9 @@ using Json = nlohmann::json;
 // MAV_CMD and MAV_FRAME of the MAVLink common set.
 constexpr int k_waypoint = 16, k_return = 20, k_land = 21, k_takeoff = 22, k_yaw = 115;
 constexpr int k_frame_msl = 0, k_frame_relative = 3, k_frame_mission = 2;
-constexpr std::size_t k_max_items = 1000;
+// MAV_CMD_NAV_FENCE_RETURN_POINT to .._CIRCLE_EXCLUSION: a fence among the items of the mission.
+constexpr int k_fence_first = 5000, k_fence_last = 5004;
+constexpr std::size_t k_max_items = 1000, k_max_areas = 100;
 
 void fail(std::vector<FieldError>& errors, std::string at, const char* code, std::string detail) {
   errors.push_back({std::move(at), code, std::move(detail)});
@@ -33,10 +35,32 @@ const Json* member(const Json& object, const char* key) {
   return it == object.end() ? nullptr : &*it;
 }
 
+/// The shapes of a fence under `key`; nothing: there are none, or they are wrong (reported).
+const Json* fence_shapes(const Json& fence, const char* key, std::vector<FieldError>& errors) {
+  const Json* shapes = member(fence, key);
+  if (shapes == nullptr || (shapes->is_array() && shapes->size() <= k_max_areas)) return shapes;
+  fail(errors, std::string("/geoFence/") + key, "wrong_type", "must be an array of at most 100");
+  return nullptr;
+}
+
+/// A second fence would leave the aircraft without the first.
+void take_area(const Json& shape, GeoPolygon area, const std::string& at, Plan& plan,
+               std::vector<FieldError>& errors) {
+  const Json* inclusion = member(shape, "inclusion");
+  if (inclusion != nullptr && !inclusion->is_boolean())
+    return fail(errors, at + "/inclusion", "wrong_type", "must be true (a fence) or false (a no-fly area)");
+  if (inclusion == nullptr || *inclusion == false) {
+    plan.no_fly.push_back(std::move(area));
+  } else if (plan.fence.empty()) {
+    plan.fence = std::move(area);
+  } else {
+    fail(errors, at, "conflict", "a second inclusion: a plan has one fence, so draw one polygon round both");
+  }
+}
+
 void read_polygons(const Json& fence, Plan& plan, std::vector<FieldError>& errors) {
-  const Json* polygons = member(fence, "polygons");
-  if (polygons == nullptr || !polygons->is_array()) return;
-  for (std::size_t i = 0; i < polygons->size() && i < 100; ++i) {
+  const Json* polygons = fence_shapes(fence, "polygons", errors);
+  for (std::size_t i = 0; polygons != nullptr && i < polygons->size(); ++i) {
     const std::string at = "/geoFence/polygons/" + std::to_string(i);
     const Json* corners = member((*polygons)[i], "polygon");
     if (corners == nullptr || !corners->is_array()) {
@@ -51,18 +75,14 @@ void read_polygons(const Json& fence, Plan& plan, std::vector<FieldError>& error
       area.push_back(*point);
     }
     if (area.size() < 3) return fail(errors, at + "/polygon", "out_of_range", "needs 3 corners");
-    const Json* inclusion = member((*polygons)[i], "inclusion");
-    if (inclusion != nullptr && *inclusion == true)
-      plan.fence = std::move(area);
-    else
-      plan.no_fly.push_back(std::move(area));
+    take_area((*polygons)[i], std::move(area), at, plan, errors);
   }
 }
 
 void read_circles(const Json& fence, Plan& plan, std::vector<FieldError>& errors) {
-  const Json* circles = member(fence, "circles");
-  if (circles == nullptr || !circles->is_array()) return;
-  for (std::size_t i = 0; i < circles->size() && i < 100; ++i) {
+  const Json* circles = fence_shapes(fence, "circles", errors);
+  for (std::size_t i = 0; circles != nullptr && i < circles->size(); ++i) {
+    const std::string here = "/geoFence/circles/" + std::to_string(i);
     const Json* circle = member((*circles)[i], "circle");
     const Json* centre = circle ? member(*circle, "center") : nullptr;
     const Json* radius = circle ? member(*circle, "radius") : nullptr;
@@ -70,8 +90,7 @@ void read_circles(const Json& fence, Plan& plan, std::vector<FieldError>& errors
                             ? lat_lon((*centre)[0], (*centre)[1])
                             : std::nullopt;
     if (!middle || radius == nullptr || !radius->is_number() || !(radius->get<double>() > 0)) {
-      fail(errors, "/geoFence/circles/" + std::to_string(i), "wrong_type",
-           "needs circle.center and circle.radius");
+      fail(errors, here, "wrong_type", "needs circle.center and circle.radius");
       continue;
     }
     const Json* inclusion = member((*circles)[i], "inclusion");
@@ -86,10 +105,7 @@ void read_circles(const Json& fence, Plan& plan, std::vector<FieldError>& errors
       const auto at = frame.wgs84_from_enu(Enu{{r * std::cos(angle), r * std::sin(angle), 0}});
       area.push_back({at.lon_deg, at.lat_deg});
     }
-    if (inside)
-      plan.fence = std::move(area);
-    else
-      plan.no_fly.push_back(std::move(area));
+    take_area((*circles)[i], std::move(area), here, plan, errors);
   }
 }
 
@@ -166,81 +182,23 @@ Plan read_qgc_plan(const Json& file, std::vector<std::string>& notes, std::vecto
       read_waypoint(*item, at, home_m, plan, errors);
     } else if (item->command == k_yaw) {
       if (!plan.waypoints.empty()) plan.waypoints.back().turn = true;
+    } else if (item->command >= k_fence_first && item->command <= k_fence_last) {
+      fail(errors, at + "/command", "unknown_value",
+           "is a fence among the mission items: draw it in geoFence (version 2)");
     } else if (item->command != k_takeoff && item->command != k_return && item->command != k_land) {
       notes.push_back(at + " has command " + std::to_string(item->command) +
                       ", which a calibration flight does not use");
     }
   }
   if (const Json* fence = member(file, "geoFence")) {
+    for (const char* old : {"polygon", "circle"}) {
+      const Json* shape = member(*fence, old);
+      if (shape != nullptr && !shape->empty())
+        fail(errors, std::string("/geoFence/") + old, "unknown_field",
+             "is a fence of version 1: open the plan in a newer QGroundControl and save it again");
+    }
     read_polygons(*fence, plan, errors);
     read_circles(*fence, plan, errors);
-  }
-  return plan;
-}
-
-Plan read_geojson_plan(const Json& file, std::vector<FieldError>& errors) {
-  Plan plan;
-  const Json* features = member(file, "features");
-  if (features == nullptr || !features->is_array()) {
-    fail(errors, "/features", "required", "must be a FeatureCollection");
-    return plan;
-  }
-  for (std::size_t i = 0; i < features->size() && i < 2000; ++i) {
-    const std::string at = "/features/" + std::to_string(i);
-    const Json *geometry = member((*features)[i], "geometry"),
-               *properties = member((*features)[i], "properties");
-    const Json* type = geometry ? member(*geometry, "type") : nullptr;
-    const Json* coordinates = geometry ? member(*geometry, "coordinates") : nullptr;
-    if (type == nullptr || coordinates == nullptr || !coordinates->is_array()) {
-      fail(errors, at + "/geometry", "required", "must be a GeoJSON geometry");
-      continue;
-    }
-    const Json none;
-    const auto property = [&](const char* key) -> const Json& {
-      const Json* found = properties ? member(*properties, key) : nullptr;
-      return found ? *found : none;
-    };
-    const std::string kind = property("kind").is_string() ? property("kind").get<std::string>() : "";
-    if (*type == "Point" && coordinates->size() >= 2) {
-      const auto place = lat_lon((*coordinates)[1], (*coordinates)[0]);
-      const Json& height = property("height_above_ground_m");
-      if (!place || !height.is_number() || !(height.get<double>() >= 0 && height.get<double>() <= 500)) {
-        fail(errors, at, "required", "a waypoint needs [lon, lat] and height_above_ground_m of 0 to 500 m");
-        continue;
-      }
-      PlanWaypoint w;
-      w.at = *place;
-      w.height_m = height.get<double>();
-      if (property("heading_deg").is_number())
-        w.heading_deg = std::fmod(std::fmod(property("heading_deg").get<double>(), 360) + 360, 360);
-      w.measure = kind != "transit";
-      plan.waypoints.push_back(w);
-    } else if (*type == "Polygon" && !coordinates->empty() && (*coordinates)[0].is_array()) {
-      GeoPolygon area;
-      for (const auto& corner : (*coordinates)[0]) {
-        const auto p = corner.is_array() && corner.size() >= 2 ? lat_lon(corner[1], corner[0]) : std::nullopt;
-        if (!p) {
-          fail(errors, at + "/geometry/coordinates/0", "out_of_range", "must be [lon, lat] in degrees");
-          break;
-        }
-        if (area.empty() || !(*p == area.back())) area.push_back(*p);
-      }
-      if (area.size() > 1 && area.front() == area.back()) area.pop_back();
-      if (area.size() < 3) {
-        fail(errors, at + "/geometry/coordinates/0", "out_of_range", "needs 3 different corners");
-      } else if (kind == "no_fly") {
-        plan.no_fly.push_back(std::move(area));
-      } else if (kind == "fence") {
-        plan.fence = std::move(area);
-      } else if (plan.outline.empty()) {
-        plan.outline = std::move(area);
-        const Json& height = property("height_m");
-        if (height.is_number() && height.get<double>() >= 1 && height.get<double>() <= 500)
-          plan.building_height_m = height.get<double>();
-      } else {
-        fail(errors, at, "conflict", "a second building outline; mark other areas with kind no_fly or fence");
-      }
-    }
   }
   return plan;
 }

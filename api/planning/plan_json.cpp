@@ -215,7 +215,8 @@ Plan read_plan(const Json& body, std::vector<FieldError>& errors) {
   Plan plan;
   Fields f(body, "", errors);
   if (!f.is_object()) return plan;
-  for (const char* given : {"id", "revision", "created_at", "changed_at", "links"}) (void)f.child(given);
+  for (const char* given : {"id", "revision", "created_at", "changed_at", "links", "notes"})
+    (void)f.child(given);
   take(f.text("name", 200, true), plan.name);
   if (const auto text = f.text("site", 36)) {
     if (const auto id = parse_uuid(*text))

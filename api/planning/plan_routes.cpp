@@ -22,8 +22,11 @@ namespace {
 
 std::string etag(const Plan& plan) { return "\"p-" + std::to_string(plan.version) + '"'; }
 
-Response answer(int status, const Plan& plan) {
-  Response response = json_response(status, plan_json(plan));
+/// `notes`: what an import left out; absent where the plan is not of a file.
+Response answer(int status, const Plan& plan, const std::optional<std::vector<std::string>>& notes = {}) {
+  auto body = plan_json(plan);
+  if (notes) body["notes"] = *notes;
+  Response response = json_response(status, body);
   response.header("ETag", etag(plan));
   return response;
 }
@@ -41,7 +44,8 @@ Response list(PlanningApi& s, const Request& request) {
 }
 
 /// Stores a plan that was read; refuses what is wrong with it.
-Response store_new(PlanningApi& s, const Request& request, Plan plan, std::vector<FieldError> errors) {
+Response store_new(PlanningApi& s, const Request& request, Plan plan, std::vector<FieldError> errors,
+                   const std::optional<std::vector<std::string>>& notes = {}) {
   plan.site = named_or_own(plan.site);
   if (plan.site && !s.sites.site(*plan.site))
     errors.push_back({"/site", "unknown_site", "there is no such site"});
@@ -51,7 +55,7 @@ Response store_new(PlanningApi& s, const Request& request, Plan plan, std::vecto
   plan.version = 1;
   value_or_problem(s.plans.insert(stored(plan)));
   s.audit(request, "plan.create " + to_string(plan.id));
-  Response response = answer(201, plan);
+  Response response = answer(201, plan, notes);
   response.header("Location", "/api/v1/plans/" + to_string(plan.id));
   return response;
 }
@@ -159,7 +163,7 @@ Response import(PlanningApi& s, const Request& request) {
     for (const char* key : {"id", "revision", "created_at", "changed_at"}) out.erase(key);
     return json_response(200, Ordered{{"plan", std::move(out)}, {"notes", notes}});
   }
-  return store_new(s, request, std::move(plan), {});
+  return store_new(s, request, std::move(plan), {}, std::move(notes));
 }
 
 Response export_plan(PlanningApi& s, const Request& request) {

@@ -51,6 +51,31 @@ TEST(Outline, NamesWhatIsWrongByPointer) {
               ::testing::ElementsAre(" required"));
 }
 
+TEST(Outline, LosesNoFenceAndKnowsItsKindHoweverItIsWritten) {
+  const auto with = [](const std::string& kind, const std::string& geometry) {
+    return R"({"type":"FeatureCollection","features":[{"type":"Feature","properties":null,"geometry":{"type":"Polygon",
+      "coordinates":[[[3,51],[3.0001,51],[3.0001,51.0001],[3,51]]]}},{"type":"Feature","properties":{"kind":")" +
+           kind + R"("},"geometry":)" + geometry + "}]}";
+  };
+  const std::string ring = "[[2.9,50.9],[3.1,50.9],[3.1,51.1],[2.9,50.9]]",
+                    one = R"({"type":"Polygon","coordinates":[)" + ring + "]}";
+  for (const auto* kind : {"fence", "Fence", "GEO-FENCE"}) {
+    std::vector<FieldError> errors;
+    const auto request = read_outline(with(kind, one), errors);
+    ASSERT_TRUE(request) << kind;
+    EXPECT_EQ(request->input.fence.size(), 3U) << kind;
+  }
+  std::vector<FieldError> errors;
+  ASSERT_TRUE(read_outline(with("No fly", one), errors));
+  EXPECT_THAT(outline_pointers(with("perimeter", one)),
+              testing::Contains("/features/1/properties/kind unknown_value"));
+  const auto two = R"({"type":"MultiPolygon","coordinates":[[)" + ring + "],[" + ring + "]]}";
+  EXPECT_THAT(outline_pointers(with("fence", two)), testing::ElementsAre("/features/1/geometry conflict"));
+  const auto hole = R"({"type":"Polygon","coordinates":[)" + ring + "," + ring + "]}";
+  EXPECT_THAT(outline_pointers(with("fence", hole)),
+              testing::ElementsAre("/features/1/geometry/coordinates conflict"));
+}
+
 TEST(Outline, ReadsSeveralPartsAsTheirHull) {
   std::vector<FieldError> errors;
   const auto request = read_outline(
