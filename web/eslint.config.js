@@ -55,6 +55,20 @@ export default typescript.config(
     },
   },
   {
+    // An element holds the picture that it was first a part of, and that one the pictures after it: kept outside a component, none of them is ever freed.
+    files: ['**/src/**/*.tsx'],
+    ignores: ['**/src/main.tsx'], // the page itself
+    rules: {
+      'no-restricted-syntax': [
+        'error',
+        {
+          selector: ':matches(JSXElement, JSXFragment):not(:function *)',
+          message: 'an element that is kept keeps every picture it was in: make it in a function',
+        },
+      ],
+    },
+  },
+  {
     // Whatever is asked of the server is held against its contract: there is no other way to it than src/api/contract.ts, and src/live for the stream.
     files: ['**/src/**/*.ts', '**/src/**/*.tsx'],
     ignores: ['**/src/api/contract.ts', '**/src/live/browser.ts'],

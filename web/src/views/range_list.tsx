@@ -1,4 +1,4 @@
-import type { VNode } from 'preact';
+import { Component } from 'preact';
 import { useEffect, useRef } from 'preact/hooks';
 import type { RangeMsg } from '../live/messages';
 import { chosen_anchor, replayed, watched_mission, watched_scene, now_ms, tick, watched_lost } from '../state/store';
@@ -43,8 +43,7 @@ export function RangeList({ selected }: { selected: string | null }) {
     now = now_ms(),
     lost = watched_lost(),
     running = watched_mission.value?.state === 'recording';
-  const drawn = useRef(new Map<string, Drawn>()).current,
-    rows = scene ? [...scene.ranges.entries()].sort(([a], [b]) => (a < b ? -1 : 1)) : [],
+  const rows = scene ? [...scene.ranges.entries()].sort(([a], [b]) => (a < b ? -1 : 1)) : [],
     in_sight = useInSight(rows.length);
   const in_range = rows.filter(([, r]) => now - r.at_ms < STALE_MS).length;
   const total_hz = rows.reduce((s, [, r]) => s + (now - r.at_ms < STALE_MS ? (rate_hz(r) ?? 0) : 0), 0);
@@ -98,30 +97,23 @@ export function RangeList({ selected }: { selected: string | null }) {
           </thead>
           <tbody>
             {rows.map(([id, r]) => {
-              const stale = lost || !running || now - r.at_ms > STALE_MS,
-                look = `${stale} ${running} ${id === selected} ${modelled} ${raw}`,
-                says = `${look} ${r.last.t_us} ${stale ? age(now - r.at_ms) : ''}`,
-                before = drawn.get(id);
-              if (before?.row === r) {
-                if (before.says === says) return before.element;
-                if (before.look === look && !in_sight.has(id) && now - before.at_ms < UNSEEN_EVERY_MS)
-                  return before.element;
-              }
-              const element = (
+              const stale = lost || !running || now - r.at_ms > STALE_MS;
+              return (
                 <Row
                   key={id}
                   id={id}
                   row={r}
+                  t_us={r.last.t_us}
                   stale={stale}
-                  age_ms={now - r.at_ms}
+                  old={stale ? age(now - r.at_ms) : ''}
+                  now_ms={now}
+                  in_sight={in_sight.has(id)}
                   running={running}
                   selected={id === selected}
                   modelled={modelled}
                   raw={raw}
                 />
               );
-              drawn.set(id, { row: r, look, says, at_ms: now, element });
-              return element;
             })}
           </tbody>
         </table>
@@ -130,34 +122,37 @@ export function RangeList({ selected }: { selected: string | null }) {
   );
 }
 
-/// A row as it was last drawn: where it would say the same again, the same element is given, and Preact leaves it alone.
-interface Drawn {
+interface RowProps {
+  readonly id: string;
   readonly row: RangeRow;
-  readonly look: string; ///< what may not wait, in sight or not
-  readonly at_ms: number;
-  readonly says: string;
-  readonly element: VNode;
+  readonly t_us: number; ///< of its last range: the row itself is written on
+  readonly stale: boolean;
+  readonly old: string;
+  readonly now_ms: number;
+  readonly in_sight: boolean;
+  readonly running: boolean;
+  readonly selected: boolean;
+  readonly modelled: boolean;
+  readonly raw: boolean;
+}
+const LOOKS = ['row', 'stale', 'running', 'selected', 'modelled', 'raw'] as const; ///< what may not wait, in sight or not
+
+/// A row that would say the same again is left as it was drawn. No element is kept for that: one holds the whole picture that it was first a part of.
+class Row extends Component<RowProps> {
+  private drawn: RowProps | null = null;
+  override shouldComponentUpdate(next: RowProps): boolean {
+    const { drawn } = this;
+    if (!drawn || LOOKS.some((k) => drawn[k] !== next[k])) return true;
+    if (drawn.t_us === next.t_us && drawn.old === next.old) return false;
+    return next.in_sight || next.now_ms - drawn.now_ms >= UNSEEN_EVERY_MS;
+  }
+  override render(props: RowProps) {
+    this.drawn = props;
+    return <Cells {...props} />;
+  }
 }
 
-function Row({
-  id,
-  row,
-  stale,
-  age_ms,
-  running,
-  selected,
-  modelled,
-  raw,
-}: {
-  id: string;
-  row: RangeRow;
-  stale: boolean;
-  age_ms: number;
-  running: boolean;
-  selected: boolean;
-  modelled: boolean;
-  raw: boolean;
-}) {
+function Cells({ id, row, stale, old, running, selected, modelled, raw }: RowProps) {
   const cls = range_class(row.last.p_los),
     [shape, tone, word] = CLASS_LOOK[cls];
   const r = row.last,
@@ -176,7 +171,7 @@ function Row({
         {(!raw || stale) && (
           <span class={`cl ${stale ? 'off' : r.refused ? 'caution' : tone}`}>
             <Mark shape={stale ? 'off' : r.refused ? 'caution' : shape} />
-            {stale ? running ? `${age(age_ms)} old` : 'ended' : r.refused ? refused_words(r.refused) : <b>{word}</b>}
+            {stale ? running ? `${old} old` : 'ended' : r.refused ? refused_words(r.refused) : <b>{word}</b>}
           </span>
         )}
       </th>
