@@ -237,7 +237,7 @@ export function open_map(
     if (closed) return;
     const content = hooks.content(),
       scene = content.scene,
-      flies = scene?.pose && t - scene.pose.at_ms < 1500 ? scene : null;
+      flies = scene?.pose && t - scene.pose.came_ms < 1500 ? scene : null;
     rest(flies ? Math.min(STANDS_MS, ms_a_pixel(flies, camera().px_per_m * screen_ratio())) : QUIET_MS);
     if (t - aimed_ms > 300) {
       aimed_ms = t;

@@ -373,7 +373,10 @@ export class Player {
     const age_ms = (t: number): number => now_ms - Math.max(0, (at_us - t) / 1000),
       { pose, rtk, procedure } = this.scene;
     if (procedure) this.scene.procedure = { value: procedure.value, at_ms: age_ms(procedure.value.t_us) };
-    if (pose) this.scene.pose = { value: pose.value, at_ms: age_ms(pose.value.t_us) };
+    if (pose) {
+      const at_ms = age_ms(pose.value.t_us);
+      this.scene.pose = { value: pose.value, at_ms, came_ms: at_ms };
+    }
     if (rtk) this.scene.rtk = { value: rtk.value, at_ms: age_ms(rtk.value.t_us) };
     for (const row of this.scene.ranges.values()) {
       row.at_ms = age_ms(row.last.t_us);

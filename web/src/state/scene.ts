@@ -4,10 +4,14 @@ import type { GridMsg, ProcedureMsg, ProfileMsg } from '../live/flight_messages'
 import type { EstimateMsg, FixClass, MissionMsg, Pose, RangeMsg, Rtk, Vec3 } from '../live/messages';
 import { sigma_h, sigma_position } from '../map/enu';
 
-/// A value and when it came, by the steady clock of this page: staleness is about arrival, since a replayed flight carries old times.
+/// A value and when it was measured, by the steady clock of this page (state/measured.ts; of a replayed flight, by the moment that is shown).
 export interface Heard<T> {
   readonly value: T;
   readonly at_ms: number;
+}
+/// What moves on the screen is drawn by when it came.
+export interface Came<T> extends Heard<T> {
+  readonly came_ms: number;
 }
 export interface TrailPoint {
   readonly t_us: number;
@@ -44,8 +48,8 @@ export interface Flown {
 export class Scene {
   state: MissionMsg | null = null;
   state_at_ms = -Infinity;
-  pose: Heard<Pose> | null = null;
-  before: Heard<Pose> | null = null; ///< for interpolation
+  pose: Came<Pose> | null = null;
+  before: Came<Pose> | null = null; ///< for interpolation
   rtk: Heard<Rtk> | null = null;
   trail: TrailPoint[] = [];
   readonly anchors = new Map<string, Heard<EstimateMsg>>();
@@ -68,11 +72,11 @@ export class Scene {
     this.state_at_ms = at_ms;
     this.version++;
   }
-  add_pose(p: Pose, at_ms: number): void {
+  add_pose(p: Pose, at_ms: number, came_ms = at_ms): void {
     if (this.pose && p.t_us < this.pose.value.t_us - 5_000_000) this.forget_track(); // the flight began again (a looped replay)
     if (!this.pose || this.pose.value.fix !== p.fix) this.fix_since_us = p.t_us;
     this.before = this.pose;
-    this.pose = { value: p, at_ms };
+    this.pose = { value: p, at_ms, came_ms };
     if (p.enu_m) {
       const last = this.trail[this.trail.length - 1];
       if (
@@ -100,7 +104,7 @@ export class Scene {
     row.at_ms = at_ms;
     row.recent.push({ t_us: r.t_us, d: r.corrected_m });
     while (row.recent.length > 1 && r.t_us - row.recent[0]!.t_us > RECENT_US) row.recent.shift();
-    this.range_at_ms = at_ms;
+    this.range_at_ms = Math.max(this.range_at_ms, at_ms);
     this.version++;
   }
   add_estimate(e: EstimateMsg, at_ms: number): void {
@@ -199,9 +203,9 @@ export function interpolated(
   if (!b?.value.enu_m) return null;
   const body_b = b.value.enu_m,
     antenna_b = b.value.tag_enu_m ?? body_b;
-  if (!a?.value.enu_m || b.at_ms - a.at_ms > 1000 || b.at_ms <= a.at_ms)
+  if (!a?.value.enu_m || b.came_ms - a.came_ms > 1000 || b.came_ms <= a.came_ms)
     return { body: body_b, antenna: antenna_b, heading_deg: b.value.heading_deg };
-  const f = Math.min(1, (now_ms - b.at_ms) / (b.at_ms - a.at_ms));
+  const f = Math.min(1, (now_ms - b.came_ms) / (b.came_ms - a.came_ms));
   const mix = (p: Vec3, q: Vec3): Vec3 => [
     p[0] + (q[0] - p[0]) * f,
     p[1] + (q[1] - p[1]) * f,

@@ -5,6 +5,7 @@ import * as m from '../live/messages';
 import { age } from '../ui/format';
 import type { LinkState, LiveSink, LiveSource } from '../live/source';
 import type { TopicName } from '../live/stream';
+import { Measured, type TimeOf } from './measured';
 import { Scene } from './scene';
 
 export const TOPICS = [
@@ -128,6 +129,18 @@ function upsert(list: readonly m.MissionMsg[], news: readonly m.MissionMsg[]): m
   return [...by_id.values()];
 }
 
+const measured = new Measured();
+function measured_ms(
+  row: { readonly mission: string; readonly t_us: number },
+  of: TimeOf,
+  whole: boolean,
+  teaches = true,
+): number {
+  const data_age_ms = source?.data_age_ms() ?? 0,
+    arrival = { t_us: row.t_us, now_ms: now_ms(), server_now_us: server_now_us(), data_age_ms, live: !whole };
+  return measured.at_ms(row.mission, of, arrival, teaches);
+}
+
 type Handler = (data: unknown, whole: boolean) => void;
 const handlers: Record<(typeof TOPICS)[number], Handler> & Partial<Record<TopicName, Handler>> = {
   'mission.state': (data) => {
@@ -136,22 +149,23 @@ const handlers: Record<(typeof TOPICS)[number], Handler> & Partial<Record<TopicN
     for (const x of news) scene_of(x.mission).add_state(x, now_ms());
     if (news.length) synced.value = true;
   },
-  'drone.pose': (data) => {
-    for (const p of m.all(data, m.pose)) scene_of(p.mission).add_pose(p, now_ms());
+  'drone.pose': (data, whole) => {
+    for (const p of m.all(data, m.pose)) scene_of(p.mission).add_pose(p, measured_ms(p, 'position', whole), now_ms());
   },
-  'rtk.status': (data) => {
-    for (const r of m.all(data, m.rtk)) scene_of(r.mission).add_rtk(r, now_ms());
+  'rtk.status': (data, whole) => {
+    for (const r of m.all(data, m.rtk)) scene_of(r.mission).add_rtk(r, measured_ms(r, 'position', whole, false));
   },
-  ranges: (data) => {
-    for (const r of m.all(data, m.range)) scene_of(r.mission).add_range(r, now_ms());
+  ranges: (data, whole) => {
+    for (const r of m.all(data, m.range)) scene_of(r.mission).add_range(r, measured_ms(r, 'range', whole));
   },
   'anchors.estimates': (data, whole) => {
     if (whole) for (const s of scenes.values()) s.anchors.clear();
-    for (const e of m.all(data, m.estimate)) scene_of(e.mission).add_estimate(e, now_ms());
+    for (const e of m.all(data, m.estimate)) scene_of(e.mission).add_estimate(e, measured_ms(e, 'range', whole, false));
   },
   devices: (data) => (devices.value = m.all(data, m.device)),
-  system: (data) => {
-    for (const s of m.all(data, m.system)) system.value = { value: s, at_ms: now_ms() };
+  system: (data, whole) => {
+    for (const s of m.all(data, m.system))
+      system.value = { value: s, at_ms: measured_ms({ mission: '', t_us: s.t_us }, 'server', whole) };
   },
   events: (data, whole) => {
     const news = m.all(data, m.event),
@@ -168,17 +182,19 @@ const handlers: Record<(typeof TOPICS)[number], Handler> & Partial<Record<TopicN
   revisions: (data) => {
     for (const r of m.all(data, m.revision)) revision.value = Math.max(revision.value ?? 0, r.revision);
   },
-  procedure: (data) => {
-    for (const p of m.all(data, f.procedure)) scene_of(p.mission).add_procedure(p, now_ms());
+  procedure: (data, whole) => {
+    for (const p of m.all(data, f.procedure)) scene_of(p.mission).add_procedure(p, measured_ms(p, 'server', whole));
   },
-  'mission.grid': (data) => {
-    for (const g of m.all(data, f.grid)) scene_of(g.mission).add_grid(g, now_ms());
+  'mission.grid': (data, whole) => {
+    for (const g of m.all(data, f.grid)) scene_of(g.mission).add_grid(g, measured_ms(g, 'server', whole));
   },
-  'mission.turn': (data) => {
-    for (const t of m.all(data, f.turn)) scene_of(t.mission).turns.set(t.anchor, { value: t, at_ms: now_ms() });
+  'mission.turn': (data, whole) => {
+    for (const t of m.all(data, f.turn))
+      scene_of(t.mission).turns.set(t.anchor, { value: t, at_ms: measured_ms(t, 'server', whole) });
   },
-  'mission.height': (data) => {
-    for (const h of m.all(data, f.height)) scene_of(h.mission).heights.set(h.anchor, { value: h, at_ms: now_ms() });
+  'mission.height': (data, whole) => {
+    for (const h of m.all(data, f.height))
+      scene_of(h.mission).heights.set(h.anchor, { value: h, at_ms: measured_ms(h, 'server', whole) });
   },
   jobs: () => {
     jobs_version.value++;
@@ -193,7 +209,7 @@ export function back_words(
   resynchronised: boolean,
 ): string {
   const back = outage_ms === null ? 'Connected again' : `Link back after ${age(outage_ms)}`;
-  if (resynchronised) return `${back}. Resynchronised: all values are current`;
+  if (resynchronised) return `${back}. Resynchronised: all values are those of the server`;
   const what = [...recovered].map(([topic, n]) => `${n} of ${TOPIC_WORDS[topic] ?? topic.replaceAll('.', ' ')}`);
   return what.length ? `${back}, recovered messages: ${what.join(', ')}` : `${back}. Nothing was missed`;
 }
@@ -224,6 +240,7 @@ export function connect(live: LiveSource, refused: () => void, fresh: () => void
     gap: () => touch(),
     restarted: () => {
       scenes.clear();
+      measured.clear();
       mission_list.value = [];
       synced.value = false;
       server_alarms.value = [];

@@ -108,6 +108,7 @@ function Waiting() {
   );
 }
 
+const RATE_STALE_MS = 5000;
 function Progress() {
   tick.value;
   const m = current_mission.value!,
@@ -182,7 +183,7 @@ function Progress() {
         </div>
         <div>
           <dt>Rate</dt>
-          <dd class={cls}>
+          <dd class={running && now_ms() - (scene?.range_at_ms ?? -Infinity) > RATE_STALE_MS ? 'stale' : cls}>
             <Q v={running ? fixed(m.range_rate_hz, 0) : '–'} u="Hz" />
           </dd>
         </div>

@@ -71,7 +71,9 @@ export function RangeList({ selected }: { selected: string | null }) {
             : lost
               ? not_loaded_words('lost')
               : running
-                ? 'No range yet. Is the tag powered, and is an anchor in range?'
+                ? watched_mission.value?.n_ranges
+                  ? 'No range for a while. Is the tag still powered, and is an anchor in range?'
+                  : 'No range yet. Is the tag powered, and is an anchor in range?'
                 : 'The last 20 s of ranges are shown while a flight is recorded.'}
         </p>
       ) : (

@@ -3,9 +3,10 @@ import { useEffect, useState } from 'preact/hooks';
 import { error_text } from '../../api/client';
 import { devices_of, take_devices, type Devices } from '../../api/missions';
 import { may } from '../../state/session';
-import { events, link, say } from '../../state/store';
+import { devices as known, events, link, now_ms, say, scenes, tick } from '../../state/store';
 import { HoldButton } from './hold_button';
 
+const SILENT_MS = 5000; ///< rows that come by another way are measurements too
 export function DevicesNote({ mission }: { mission: string }) {
   const [devices, set_devices] = useState<Devices | null>(null),
     [problem, set_problem] = useState('');
@@ -25,8 +26,11 @@ export function DevicesNote({ mission }: { mission: string }) {
       gone = true;
     };
   }, [mission, news]);
-  const holder = devices?.held_by;
-  if (!holder) return null;
+  tick.value;
+  const holder = devices?.held_by,
+    scene = scenes.get(mission),
+    came_ms = Math.max(scene?.range_at_ms ?? -Infinity, scene?.pose?.at_ms ?? -Infinity);
+  if (!holder || !known.value.length || now_ms() - came_ms < SILENT_MS) return null;
   const take = async (): Promise<void> => {
     set_problem('');
     try {

@@ -132,6 +132,7 @@ export function plan_content(
     const d = near.shift,
       moved = (p: NonNullable<Scene['pose']>): NonNullable<Scene['pose']> => ({
         at_ms: p.at_ms,
+        came_ms: p.came_ms,
         value: {
           ...p.value,
           enu_m: p.value.enu_m && plus(p.value.enu_m, d),
