@@ -2,11 +2,11 @@
 
 #include "app_fixture.hpp"
 
-namespace anchord::test {
+namespace anchord::test::plan_files_test {
 namespace {
 
 using testing::AllOf;
-using testing::HasSubstr;
+using ::testing::HasSubstr;
 
 const std::string k_hall = "[[3.7131,51.0231],[3.7135,51.0231],[3.7135,51.0233],[3.7131,51.0231]]";
 const std::string k_wide = "[[3.7121,51.0221],[3.7145,51.0221],[3.7145,51.0243],[3.7121,51.0221]]";
@@ -163,4 +163,4 @@ TEST_F(PlanFiles, LoseNoFenceOfKml) {
 }
 
 }  // namespace
-}  // namespace anchord::test
+}  // namespace anchord::test::plan_files_test
