@@ -5,7 +5,7 @@
 namespace anchord::test::plan_files_test {
 namespace {
 
-using testing::AllOf;
+using ::testing::AllOf;
 using ::testing::HasSubstr;
 
 const std::string k_hall = "[[3.7131,51.0231],[3.7135,51.0231],[3.7135,51.0233],[3.7131,51.0231]]";
