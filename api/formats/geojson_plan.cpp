@@ -6,6 +6,7 @@
 
 #include "api/formats/area_kind.hpp"
 #include "core/base/text.hpp"
+#include "core/base/to_wire.hpp"
 
 namespace anchord::api {
 namespace {
@@ -74,7 +75,7 @@ class FeatureReader {
     if (given->is_string()) kind_ = area_kind(given->get_ref<const std::string&>());
     if (kind_) return true;
     fail("/properties/kind", "unknown_value",
-         "must be " + std::string(k_area_kinds) + ", not " + to_utf8(given->dump(), 60));
+         "must be " + std::string(k_area_kinds) + ", not " + to_utf8(to_wire(*given), 60));
     return false;
   }
 
@@ -211,7 +212,7 @@ class FeatureReader {
                               !(height->get<double>() <= k_most_height_m))) {
       return fail(
           "/properties/height_m", "out_of_range",
-          "must be a number, the height of the building, 1 to 500 m, not " + to_utf8(height->dump(), 60));
+          "must be a number, the height of the building, 1 to 500 m, not " + to_utf8(to_wire(*height), 60));
     }
     if (holes) note("has courtyards, which are not flown into");
     if (height != nullptr) plan.building_height_m = height->get<double>();

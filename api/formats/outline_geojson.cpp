@@ -9,6 +9,7 @@
 #include "api/formats/area_kind.hpp"
 #include "api/kit/reader.hpp"
 #include "core/base/text.hpp"
+#include "core/base/to_wire.hpp"
 #include "core/geo/enu.hpp"
 
 namespace anchord::api {
@@ -165,7 +166,7 @@ class OutlineReader {
       area.kind = area_kind(kind->get_ref<const std::string&>());
       if (!area.kind && *kind != "")
         return fail(base + "kind", "unknown_value",
-                    "must be outline, no_fly or fence, not " + to_utf8(kind->dump(), 60));
+                    "must be outline, no_fly or fence, not " + to_utf8(to_wire(*kind), 60));
     }
     if (const auto height = properties.find("height_m"); height != properties.end() && !height->is_null()) {
       if (!height->is_number() || !(height->get<double>() > 0 && height->get<double>() <= 500)) {
