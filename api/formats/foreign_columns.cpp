@@ -4,16 +4,17 @@
 #include <cmath>
 #include <optional>
 
+#include "api/formats/foreign_meaning.hpp"
 #include "api/formats/globe_track.hpp"
 
 namespace anchord::api {
 namespace {
 
 constexpr std::array k_track_fields{
-    "time",    "lat",     "lon",     "height", "separation", "x",       "y",  "z",  "fix", "sigma_h",
-    "sigma_v", "sigma_e", "sigma_n", "age",    "satellites", "heading", "qx", "qy", "qz",  "qw"};
-constexpr std::array k_range_fields{"time", "anchor", "range", "tag",     "rss",
-                                    "rx",   "fp",     "seq",   "antenna", "kind"};
+    "time",    "zone",    "lat",     "lon", "height",     "separation", "x",  "y",  "z",  "fix", "sigma_h",
+    "sigma_v", "sigma_e", "sigma_n", "age", "satellites", "heading",    "qx", "qy", "qz", "qw"};
+constexpr std::array k_range_fields{"time", "zone", "anchor", "range",   "tag", "rss",
+                                    "rx",   "fp",   "seq",    "antenna", "kind"};
 
 template <std::size_t N>
 ForeignColumns guessed(const ForeignTable& table, const std::array<const char*, N>& fields) {
@@ -103,9 +104,15 @@ ForeignColumns guessed_track_columns(const ForeignTable& table) {
     return node.empty() ? std::optional<std::string>() : std::optional(std::move(node.mapped()));
   };
   const bool globe = out.contains("lat") && out.contains("lon");
-  // Columns called latitude and longitude that hold metres are those of a map.
+  for (const char* axis : {"lat", "lon"})
+    if (const auto letters = hemisphere_column(table, out, axis))
+      out[std::string(axis) + "_hemisphere"] = *letters;
+  // Columns called latitude and longitude that hold metres are those of a map. What is near zero and no
+  // degree may be degrees and minutes, or one for the other: a person says it.
   if (globe && out.contains("height") &&
-      degrees_kind(table, out.at("lat"), out.at("lon")) == PlaceKind::no_degrees) {
+      degrees_kind(table, out.at("lat"), out.at("lon")) == PlaceKind::no_degrees &&
+      (beyond(table.sample_numbers(out.at("lat")), k_most_local_m) ||
+       beyond(table.sample_numbers(out.at("lon")), k_most_local_m))) {
     out["x"] = *take("lon");
     out["y"] = *take("lat");
     out["z"] = *take("height");

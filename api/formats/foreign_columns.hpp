@@ -22,8 +22,17 @@ inline constexpr std::array k_foreign_fields{
                "t_s t_us t_ms t_ns time time_s time_ms time_us time_ns time_utc time_utc_usec "
                "timestamp timestamp_s timestamp_ms timestamp_us timestamp_ns t utc gpst gps_time unix "
                "datetime date_time zeit"},
+    FieldNames{"zone", "tz timezone time_zone utc_offset tz_offset gmt_offset zeitzone"},
     FieldNames{"lat", "lat_deg lat latitude latitude_deg breite"},
     FieldNames{"lon", "lon_deg lon lng longitude longitude_deg laenge"},
+    FieldNames{"lat_hemisphere",
+               "n_s ns lat_dir latitude_dir lat_direction latitude_direction lat_ref latitude_ref lat_hemi "
+               "lat_hemisphere latitude_hemisphere lat_ns north_south ns_indicator n_s_indicator hemisphere"},
+    FieldNames{
+        "lon_hemisphere",
+        "e_w ew lon_dir longitude_dir lon_direction longitude_direction lon_ref longitude_ref lon_hemi "
+        "lon_hemisphere longitude_hemisphere lon_ew east_west ew_indicator e_w_indicator lng_dir "
+        "lng_ref hemisphere"},
     FieldNames{"height",
                "h_m h_ell h_ell_m height_ell hoehe_ell ell_height "
                "ellipsoidal_height height_ellipsoid height_ellipsoid_m ellipsoid_height "

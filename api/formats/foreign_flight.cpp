@@ -17,7 +17,8 @@ namespace {
 
 constexpr std::string_view k_needs_time_of_ranges = "time of the ranges", k_needs_tag = "tag address",
                            k_needs_fix = "fix numbers", k_needs_degrees = "degrees", k_needs_crs = "crs",
-                           k_needs_heights = "heights";
+                           k_needs_heights = "heights", k_needs_heading = "heading",
+                           k_needs_addresses = "addresses";
 
 std::string_view column_of(const ForeignColumns& columns, std::string_view field) {
   const auto at = columns.find(field);
@@ -51,9 +52,39 @@ struct Reading {
   TimeReading track_time, range_time;
   double range_per_metre{1}, height_per_metre{1};
   std::optional<FixNumbers> fix;
+  std::optional<HeadingKind> heading;
+  std::optional<AddressKind> addresses;
   std::optional<std::string> crs, heights;
   bool heights_matter{};
+  std::string wrong_unit;  ///< what a column of units says that is not read
 };
+
+/// Lengths whose unit stands in a column of its own; those that an option gives are not looked at.
+void read_units(const ForeignTable& track, const ForeignTable& ranges, const ForeignOptions& o, Reading& r) {
+  const auto look = [&](const ForeignTable& table, const ForeignColumns& columns, const char* field,
+                        double* per_metre_out) {
+    const auto beside = unit_column(table, columns, field);
+    if (!beside) return;
+    if (per_metre_out != nullptr && beside->unit) {
+      *per_metre_out = per_metre(*beside->unit);
+    } else if (beside->unit != LengthUnit::m && r.wrong_unit.empty()) {
+      r.wrong_unit = table.name() + ": the column '" + beside->name + "' says that '" +
+                     std::string(column_of(columns, field)) + "' is in " + beside->word +
+                     ": write it in metres" +
+                     (per_metre_out != nullptr ? ", centimetres or millimetres" : "");
+    }
+  };
+  if (!o.range_unit) look(ranges, r.rc, "range", &r.range_per_metre);
+  if (!o.height_unit) look(track, r.tc, r.local ? "z" : "height", &r.height_per_metre);
+  for (const char* field : {"separation", "x", "y"}) look(track, r.tc, field, nullptr);
+}
+
+std::optional<HeadingKind> heading_of(const ForeignTable& track, const ForeignColumns& tc) {
+  if (!tc.contains("heading")) return HeadingKind::deg;
+  for (const char* part : {"qx", "qy", "qz", "qw"})
+    if (!tc.contains(part)) return heading_kind(track, column_of(tc, "heading"));
+  return HeadingKind::deg;  // attitudes come before a heading
+}
 
 /// Nothing where nothing says it, and where it is sea level by a geoid that nothing names.
 std::optional<std::string> heights_by_name(const ForeignTable& track, const Reading& reading) {
@@ -87,6 +118,11 @@ Reading reading_of(const ForeignTable& track, const ForeignTable& ranges, const 
     r.fix = FixNumbers::words;
   else if (!r.fix)
     r.fix = fix_numbers(track, column_of(r.tc, "fix"));
+  r.heading = o.heading ? o.heading : heading_of(track, r.tc);
+  r.addresses = o.addresses;
+  if (!r.addresses && !may_be_hexadecimal(ranges, column_of(r.rc, "anchor")) &&
+      !may_be_hexadecimal(ranges, column_of(r.rc, "tag"), o.tag))
+    r.addresses = AddressKind::as_written;
   r.crs = o.crs;
   if (!r.crs && r.kind != PlaceKind::map) r.crs = r.kind == PlaceKind::ecef ? "ECEF" : "";
   r.heights = o.heights ? o.heights : heights_by_name(track, r);
@@ -98,6 +134,7 @@ Reading reading_of(const ForeignTable& track, const ForeignTable& ranges, const 
   const auto by_name = unit_of_name(height);
   r.height_per_metre =
       per_metre(o.height_unit.value_or(by_name.value_or(whole_mm ? LengthUnit::mm : LengthUnit::m)));
+  read_units(track, ranges, o, r);
   const bool ecef = r.crs && plain_name(*r.crs) == "ecef";
   r.heights_matter = !r.local || (!(r.crs && r.crs->empty()) && !ecef);
   return r;
@@ -109,6 +146,8 @@ Needs needs_of(const Reading& r, const std::string& tag) {
     out.push_back(field == "time" ? std::string(k_needs_time_of_ranges) : field);
   if (!r.rc.contains("tag") && tag.empty()) out.emplace_back(k_needs_tag);
   if (!r.fix) out.emplace_back(k_needs_fix);
+  if (!r.heading) out.emplace_back(k_needs_heading);
+  if (!r.addresses) out.emplace_back(k_needs_addresses);
   if (r.kind == PlaceKind::no_degrees) out.emplace_back(k_needs_degrees);
   if (!r.crs) out.emplace_back(k_needs_crs);
   if (r.heights_matter && !r.heights) out.emplace_back(k_needs_heights);
@@ -130,10 +169,21 @@ std::string words_of(const std::string& need, const ForeignTable& track, const F
     return track.name() + ": 1 and 2 in '" + std::string(column_of(r.tc, "fix")) +
            "' have different meanings in different programs: give --fix-numbers solution, nmea, rtklib or "
            "mavlink";
+  if (need == k_needs_heading)
+    return track.name() + ": '" + std::string(column_of(r.tc, "heading")) +
+           "' has no unit, and no value beyond two pi: give --heading deg or rad (clockwise from true "
+           "north), "
+           "deg_ccw_from_east or rad_ccw_from_east (ROS)";
+  if (need == k_needs_addresses)
+    return ranges.name() +
+           ": addresses look like hexadecimal numbers without 0x, 1021 beside 9E04: give --addresses hex, or "
+           "names where they are names and decimal numbers";
   if (need == k_needs_degrees)
     return track.name() +
-           ": the columns of latitude and longitude are not in degrees: --column track.x=NAME, "
-           "track.y, track.z and --crs EPSG:CODE of the map";
+           ": the columns of latitude and longitude are not in decimal degrees (degrees and minutes, or one "
+           "for the other?): write decimal degrees, exchange them with --column track.lat=NAME and "
+           "track.lon, "
+           "or give --column track.x=NAME, track.y, track.z and --crs EPSG:CODE of a map";
   if (need == k_needs_crs)
     return track.name() + ": x, y, z are " + k_of_a_map + ": --crs EPSG:25832, UTM 32N or ECEF";
   if (need == k_needs_heights)
@@ -190,6 +240,10 @@ std::string no_time(std::string_view cell) {
   return '"' + to_utf8(cell, 40) + "\" is not a time that can be read (like 2026-05-04 10:00:01.5)";
 }
 
+std::string time_text(std::size_t row, const Cells::At& time, const Cells::At& zone, const TimeReading& how) {
+  return how.unit == TimeUnit::date ? with_zone(time.text(row), zone.text(row)) : std::string(time.text(row));
+}
+
 /// Reads positions of one table.
 class TrackReader {
  public:
@@ -201,9 +255,12 @@ class TrackReader {
 
   void read(ForeignFlight& out) const {
     for (std::size_t row = 0; row < table_.n_rows(); ++row) {
-      const auto time = time_us(table_, time_.text(row), reading_.track_time, epoch_us_);
+      const auto moment = time_text(row, time_, zone_, reading_.track_time);
+      const auto time = time_us(table_, moment, reading_.track_time, epoch_us_);
       const auto at = place(row);
-      const std::string wrong = time ? wrong_place(at) : no_time(time_.text(row));
+      const std::string wrong = !time                     ? no_time(moment)
+                                : wrong_place(at).empty() ? wrong_sigma(row)
+                                                          : wrong_place(at);
       if (!wrong.empty()) {
         out.refused.push_back(row_text(table_, row, wrong));
         continue;
@@ -225,11 +282,20 @@ class TrackReader {
 
  private:
   std::optional<Eigen::Vector3d> place(std::size_t row) const {
-    const auto x = x_.number(row), y = y_.number(row), z = z_.number(row);
+    const auto x = with_sign(x_.number(row), row, east_), y = with_sign(y_.number(row), row, north_),
+               z = z_.number(row);
     const auto geoid = separation_ ? separation_->number(row) : std::optional(0.0);
     if (!x || !y || !z || !geoid) return std::nullopt;
     const double per_degree = reading_.kind == PlaceKind::degrees_1e7 ? 1e7 : 1;
     return Eigen::Vector3d(*x / per_degree, *y / per_degree, *z / reading_.height_per_metre + *geoid);
+  }
+  /// By the letter of its hemisphere; nothing where it has none, or a sign that says the other one.
+  static std::optional<double> with_sign(std::optional<double> value, std::size_t row,
+                                         const Cells::At& letter) {
+    if (!value || !letter.column) return value;
+    const auto sign = hemisphere_sign(letter.text(row));
+    if (!sign || (*value < 0 && *sign > 0)) return std::nullopt;
+    return *sign * std::abs(*value);
   }
   /// What can be no place of this kind; looked at in each row, for the first ones may look otherwise.
   std::string wrong_place(const std::optional<Eigen::Vector3d>& at) const {
@@ -241,6 +307,12 @@ class TrackReader {
     return own_frame_ && is_of_a_map(*at)
                ? "x, y, z are more than 100 km from zero: a coordinate system is needed"
                : "";
+  }
+  std::string wrong_sigma(std::size_t row) const {
+    for (const auto* sigma : {&sigma_h_, &sigma_v_, &sigma_e_, &sigma_n_})
+      if (const auto value = sigma->number(row); value && !row_limits::k_sigma_m.hold(*value))
+        return "the standard deviation is not 0.00001 to 1000 m";
+    return "";
   }
   FixClass class_of(std::size_t row, std::map<std::string, std::size_t>& unknown) const {
     if (!fix_.column) return FixClass::rtk_fixed;
@@ -260,7 +332,7 @@ class TrackReader {
     if (x && y && z && w)
       fix.enu_from_body = row_limits::rotation_of({*x, *y, *z, *w});
     else if (const auto to = heading_.number(row))
-      fix.enu_from_body = row_limits::rotation_of_heading(std::fmod(std::fmod(*to, 360) + 360, 360));
+      fix.enu_from_body = row_limits::rotation_of_heading(north_deg(*to, *reading_.heading));
   }
 
   const ForeignTable& table_;
@@ -269,7 +341,9 @@ class TrackReader {
   Cells cells_;
   bool own_frame_{};
   std::optional<Cells::At> separation_;
-  Cells::At time_ = cells_("time"), x_ = cells_(reading_.local ? "x" : "lon"),
+  Cells::At time_ = cells_("time"), zone_ = cells_("zone"),
+            north_ = cells_(reading_.local ? "" : "lat_hemisphere"),
+            east_ = cells_(reading_.local ? "" : "lon_hemisphere"), x_ = cells_(reading_.local ? "x" : "lon"),
             y_ = cells_(reading_.local ? "y" : "lat"), z_ = cells_(reading_.local ? "z" : "height"),
             fix_ = cells_("fix"), sigma_h_ = cells_("sigma_h"), sigma_v_ = cells_("sigma_v"),
             sigma_e_ = cells_("sigma_e"), sigma_n_ = cells_("sigma_n"), qx_ = cells_("qx"),
@@ -280,24 +354,25 @@ class TrackReader {
 Result<void> read_ranges(const ForeignTable& table, const Reading& reading, const ForeignOptions& o,
                          ForeignFlight& out) {
   const Cells cells(table, reading.rc);
-  const auto time = cells("time"), distance = cells("range"), anchor = cells("anchor"), tag = cells("tag"),
-             kind = cells("kind"), rss = cells("rss"), rx = cells("rx"), fp = cells("fp"), seq = cells("seq"),
-             antenna = cells("antenna");
+  const auto time = cells("time"), zone = cells("zone"), distance = cells("range"), anchor = cells("anchor"),
+             tag = cells("tag"), kind = cells("kind"), rss = cells("rss"), rx = cells("rx"), fp = cells("fp"),
+             seq = cells("seq"), antenna = cells("antenna");
   std::map<NetworkId, std::string> names;  // of anchors that have a name alone
   for (std::size_t row = 0; row < table.n_rows(); ++row) {
-    const auto us = time_us(table, time.text(row), reading.range_time, o.epoch_us);
+    const auto moment = time_text(row, time, zone, reading.range_time);
+    const auto us = time_us(table, moment, reading.range_time, o.epoch_us);
     const auto metres = distance.number(row);
     const std::string who(anchor.text(row)), of(tag.text(row).empty() ? o.tag : tag.text(row));
     const std::string wrong = of.empty()    ? "no tag"
                               : who.empty() ? "no anchor"
-                              : !us         ? no_time(time.text(row))
+                              : !us         ? no_time(moment)
                               : !metres     ? "no range"
                                             : "";
     if (!wrong.empty()) {
       out.refused.push_back(row_text(table, row, wrong));
       continue;
     }
-    const auto id = foreign_id(who);
+    const auto id = foreign_id(who, *reading.addresses);
     if (id.is_name) {
       const auto& other = names.try_emplace(id.id, who).first->second;
       if (other != who)
@@ -307,7 +382,7 @@ Result<void> read_ranges(const ForeignTable& table, const Reading& reading, cons
     out.data.anchor_names.try_emplace(id.id, who);
     Range range;
     range.time = UtcTime::from_us(*us);
-    range.tag = foreign_id(of).id;
+    range.tag = foreign_id(of, *reading.addresses).id;
     range.anchor = id.id;
     range.distance_m = *metres / reading.range_per_metre;
     if (kind.text(row) == "anchor_anchor") range.kind = RangeKind::anchor_anchor;
@@ -366,10 +441,41 @@ Result<std::optional<SourceCrsSpec>> source_of(const Reading& r, double max_datu
   return std::optional(spec);
 }
 
-void add_notes(const ForeignTable& track, const Reading& r, ForeignFlight& out) {
+/// What no field uses, so that nobody takes it for read.
+void note_unused(const ForeignTable& table, std::initializer_list<const ForeignColumns*> used,
+                 std::initializer_list<const char*> lengths, std::vector<std::string>& notes) {
+  std::set<std::string_view> known;
+  std::set<std::string> of_units;
+  for (const auto* columns : used) {
+    for (const auto& [field, column] : *columns) known.insert(column);
+    for (const char* field : lengths)
+      if (const auto beside = unit_column(table, *columns, field)) of_units.insert(beside->name);
+  }
+  std::vector<std::string> left;
+  for (const auto& column : table.columns())
+    if (!column.empty() && !known.contains(column) && !of_units.contains(column))
+      left.push_back(to_utf8(column, 40));
+  if (left.empty()) return;
+  const auto n = left.size();
+  if (n > 20) left.resize(20);
+  notes.push_back(table.name() + ": columns that are not used: " + listed(left) +
+                  (n > 20 ? " and " + std::to_string(n - 20) + " more" : ""));
+}
+
+void add_notes(const ForeignTable& track, const ForeignTable& ranges, const Reading& r, ForeignFlight& out) {
   auto& notes = out.data.notes;
+  if (&track == &ranges) {
+    note_unused(track, {&r.tc, &r.rc}, {"range", "height", "z"}, notes);
+  } else {
+    note_unused(track, {&r.tc}, {"height", "z"}, notes);
+    note_unused(ranges, {&r.rc}, {"range"}, notes);
+  }
   if (!r.tc.contains("fix"))
     notes.push_back(track.name() + ": no column is the fix class, every position is used as RTK fixed");
+  if (r.fix == FixNumbers::gnss)
+    notes.push_back(track.name() +
+                    ": \"FIX\" is taken as a position without RTK; --fix-numbers words where it "
+                    "is RTK fixed");
   for (const auto& [word, n] : out.unknown_fix)
     notes.push_back(track.name() + ": " + std::to_string(n) + " positions have the fix class \"" + word +
                     "\", which is unknown: they count as no fix");
@@ -402,6 +508,7 @@ Result<ForeignFlight> foreign_flight(const ForeignTable& track, const ForeignTab
   std::string unknown;
   for (const auto& need : needs_of(reading, options.tag))
     unknown += (unknown.empty() ? "" : "\n") + words_of(need, track, ranges, reading);
+  if (!reading.wrong_unit.empty()) unknown += (unknown.empty() ? "" : "\n") + reading.wrong_unit;
   if (!unknown.empty()) return make_error(Errc::invalid_argument, unknown);
   ForeignFlight out;
   BOOST_OUTCOME_TRY(out.source, source_of(reading, options.max_datum_error_m));
@@ -418,7 +525,7 @@ Result<ForeignFlight> foreign_flight(const ForeignTable& track, const ForeignTab
       fix.local_m.setZero();
     }
   }
-  add_notes(track, reading, out);
+  add_notes(track, ranges, reading, out);
   return out;
 }
 

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "api/formats/foreign_columns.hpp"
+#include "api/formats/foreign_meaning.hpp"
 #include "api/formats/foreign_values.hpp"
 #include "core/geo/source_crs.hpp"
 #include "core/types/flight_data.hpp"
@@ -21,6 +22,8 @@ struct ForeignOptions {
   std::optional<TimeScale> track_time_scale{}, range_time_scale{};
   std::optional<LengthUnit> range_unit{}, height_unit{};
   std::optional<FixNumbers> fix_numbers{};
+  std::optional<HeadingKind> heading{};
+  std::optional<AddressKind> addresses{};
   std::optional<std::string> crs{};  ///< of x, y, z, as SourceCrsSpec has it; empty: a local frame
   /// "ellipsoidal", "column" (another column has the height of the geoid), or as read_heights() takes it
   std::optional<std::string> heights{};

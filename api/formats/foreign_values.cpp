@@ -73,7 +73,7 @@ std::optional<Zone> zone_of(std::string_view text) {
   std::string upper;
   for (const char c : text) upper += c >= 'a' && c <= 'z' ? static_cast<char>(c - 'a' + 'A') : c;
   if (upper.empty()) return Zone{};
-  if (upper == "Z" || upper == "UTC") return Zone{0, false, true};
+  if (upper == "Z" || upper == "UTC" || upper == "GMT") return Zone{0, false, true};
   if (upper == "GPST") return Zone{0, true, true};
   Scanner scan(upper);
   int hours = 0, minutes = 0;
@@ -217,12 +217,16 @@ LengthUnit range_unit(const ForeignTable& table, std::string_view column) {
 
 std::optional<FixNumbers> fix_numbers(const ForeignTable& table, std::string_view column) {
   const auto at = table.column(column);
-  bool any = false;
+  bool any = false, fix = false, of_rtk = false;
   for (std::size_t row = 0; at && row < table.n_rows() && !any; ++row) {
     const auto cell = table.cell(row, *at);
     any = !cell.empty() && std::ranges::all_of(cell, is_digit);
+    const auto known = any ? std::nullopt : fix_of(cell, FixNumbers::gnss);
+    fix = fix || plain_name(cell) == "fix";
+    of_rtk = of_rtk || known == k_float || known == k_fixed;
   }
-  if (!any) return FixNumbers::words;
+  // Receivers without RTK write FIX for any position; beside FLOAT it is the other state of RTK.
+  if (!any) return fix && !of_rtk ? FixNumbers::gnss : FixNumbers::words;
   // Names that one of them alone goes by; "fix", "quality" and "rtk" are used with any.
   const std::string name = plain_name(column);
   if (name == "q") return FixNumbers::rtklib;
@@ -252,6 +256,7 @@ std::optional<FixClass> fix_of(std::string_view cell, FixNumbers numbers) {
   }
   const std::string word = plain_name(cell);
   if (word.empty()) return std::nullopt;
+  if (numbers == FixNumbers::gnss && word == "fix") return k_single;
   for (const auto& known : k_worded) {
     if (contains(known.words, ' ' + word + ' ')) return known.fix;
   }

@@ -96,6 +96,9 @@ Result<Message> parse_gga(FieldReader f) {
   }
   out.satellites = f.integer(7);
   out.hdop = f.not_negative(8);
+  // Heights of another unit than metres, which a few aviation receivers write, are not read as metres.
+  for (const std::size_t unit : {10U, 12U})
+    if (!f.text(unit).empty() && f.text(unit) != "M") f.fail(unit);
   out.height_msl_m = f.number(9);
   out.geoid_separation_m = f.number(11);
   out.age_s = f.not_negative(13);

@@ -121,10 +121,22 @@ constexpr std::array k_settings{
             [](const std::string& text, ForeignOptions& out) {
               return word(text, api::k_length_unit_words, out.height_unit);
             }},
-    Setting{"fix-numbers", "Meaning of the numbers of the fix class: solution, nmea, rtklib, mavlink",
+    Setting{"heading",
+            "Unit and direction of the heading: deg or rad (clockwise from true north), deg_ccw_from_east, "
+            "rad_ccw_from_east",
             [](const std::string& text, ForeignOptions& out) {
-              return word(text, api::k_fix_numbers_words, out.fix_numbers);
+              return word(text, api::k_heading_kind_words, out.heading);
             }},
+    Setting{"addresses", "Addresses without 0x: hex, or names (names and decimal numbers)",
+            [](const std::string& text, ForeignOptions& out) {
+              return word(text, api::k_address_kind_words, out.addresses);
+            }},
+    Setting{
+        "fix-numbers",
+        "Meaning of the fix class: solution, nmea, rtklib, mavlink; of words: words, or gnss (FIX is no RTK)",
+        [](const std::string& text, ForeignOptions& out) {
+          return word(text, api::k_fix_numbers_words, out.fix_numbers);
+        }},
     Setting{"crs", "Coordinate system of x, y, z: EPSG:25832, UTM 32N, ECEF",
             [](const std::string& text, ForeignOptions& out) -> Result<void> {
               out.crs = text;

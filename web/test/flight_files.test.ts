@@ -51,6 +51,9 @@ const in_seconds: Reading = {
   crs: '',
   heights: 'ellipsoidal',
   height: 'm',
+  heading: 'deg',
+  addresses: 'names',
+  wrong_unit: '',
 };
 
 describe('a flight from files', () => {

@@ -74,7 +74,7 @@ function run(c: Case) {
 
 it.each((file('cases.json') as readonly Case[]).map((c) => [c.name, c] as const))('reads %s', (_, c) => {
   if (c.error !== undefined) {
-    expect(() => run(c)).toThrow(c.error);
+    expect(() => run(c).flight()).toThrow(c.error);
     return;
   }
   const { needs, flight } = run(c);

@@ -32,6 +32,9 @@ ForeignOptions given_of(const Json& one) {
   if (given.contains("heights")) out.heights = given["heights"];
   if (given.contains("fix_numbers"))
     out.fix_numbers = k_fix_numbers_words.find(given["fix_numbers"].get<std::string>());
+  if (given.contains("heading")) out.heading = k_heading_kind_words.find(given["heading"].get<std::string>());
+  if (given.contains("addresses"))
+    out.addresses = k_address_kind_words.find(given["addresses"].get<std::string>());
   if (given.contains("track_time_scale"))
     out.track_time_scale = k_time_scale_words.find(given["track_time_scale"].get<std::string>());
   if (given.contains("epoch_utc"))
@@ -175,12 +178,28 @@ TEST(ForeignFlight, PutsATrackOfAMapOnTheGlobeAndSaysSo) {
 }
 
 TEST(ForeignFlight, NamesTheOptionThatSaysWhatIsNotKnown) {
-  auto track = ForeignTable::parse("t.csv", "time,lat,lon,alt,fix\n1777888801.5,51,3.7,55,1\n");
-  auto ranges = ForeignTable::parse("r.csv", "time,who,range_m\n1777888801.5,0x6a21,7.4\n");
+  auto track = ForeignTable::parse("t.csv", "time,lat,lon,alt,fix,yaw\n1777888801.5,51,3.7,55,1,1.5\n");
+  auto ranges = ForeignTable::parse("r.csv", "time,who,range_m,tag_id\n1777888801.5,0x6a21,7.4,6e0c\n");
   const auto flight = read_foreign_flight(std::move(track).value(), std::move(ranges).value(), {});
   ASSERT_FALSE(flight);
-  for (const char* option : {"--column ranges.anchor=NAME", "--tag", "--fix-numbers", "--heights"})
+  for (const char* option :
+       {"--column ranges.anchor=NAME", "--addresses", "--heading", "--fix-numbers", "--heights"})
     EXPECT_NE(flight.error().message.find(option), std::string::npos) << flight.error().message;
+}
+
+TEST(ForeignFlight, NamesTheColumnsThatNothingUses) {
+  auto track = ForeignTable::parse(
+      "t.csv", "time,lat,N/S,lon,E/W,h_ell,alt_units,speed,fix\n1777888801.5,51,N,3.7,W,55,m,2,FIX\n");
+  auto ranges = ForeignTable::parse("r.csv", "time,anchor,range_m,battery,\n1777888801.5,0x6a21,7.4,3.9,\n");
+  ForeignOptions options;
+  options.tag = "0x6e01";
+  const auto flight = read_foreign_flight(std::move(track).value(), std::move(ranges).value(), options);
+  ASSERT_TRUE(flight) << flight.error().message;
+  const auto notes = Json(flight.value().notes).dump();
+  EXPECT_NE(notes.find("t.csv: columns that are not used: speed\""), std::string::npos) << notes;
+  EXPECT_NE(notes.find("r.csv: columns that are not used: battery\""), std::string::npos) << notes;
+  EXPECT_NE(notes.find("taken as a position without RTK"), std::string::npos) << notes;
+  EXPECT_EQ(flight.value().fixes.at(0).position.lon_deg, -3.7);
 }
 
 }  // namespace

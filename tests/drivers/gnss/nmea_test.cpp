@@ -134,13 +134,15 @@ INSTANTIATE_TEST_SUITE_P(All, NmeaQuality,
 
 TEST(Nmea, RefusesWhatIsOutOfItsDomainThoughTheChecksumIsRight) {
   for (const char* text :
-       {"GNGGA,250000.00,5101.0,N,00342.0,E,4,14,0.9,22.5,M,45.0,M,0.8,",  // hour 25
-        "GNGGA,120000.00,5160.0,N,00342.0,E,4,14,0.9,22.5,M,45.0,M,0.8,",  // 60 minutes
-        "GNGGA,120000.00,9101.0,N,00342.0,E,4,14,0.9,22.5,M,45.0,M,0.8,",  // beyond the pole
-        "GNGGA,120000.00,5101.0,X,00342.0,E,4,14,0.9,22.5,M,45.0,M,0.8,",  // no such side
-        "GNGGA,120000.00,5101.0,N,00342.0,E,4,14,0.9,nan,M,45.0,M,0.8,",   // not a number
-        "GNGGA,120000.00,5101.0,N",                                        // cut short
-        "GNRMC,120000.00,A,5101.0,N,00342.0,E,0,0,310224,,,D",             // 31 February
+       {"GNGGA,250000.00,5101.0,N,00342.0,E,4,14,0.9,22.5,M,45.0,M,0.8,",   // hour 25
+        "GNGGA,120000.00,5160.0,N,00342.0,E,4,14,0.9,22.5,M,45.0,M,0.8,",   // 60 minutes
+        "GNGGA,120000.00,9101.0,N,00342.0,E,4,14,0.9,22.5,M,45.0,M,0.8,",   // beyond the pole
+        "GNGGA,120000.00,5101.0,X,00342.0,E,4,14,0.9,22.5,M,45.0,M,0.8,",   // no such side
+        "GNGGA,120000.00,5101.0,N,00342.0,E,4,14,0.9,nan,M,45.0,M,0.8,",    // not a number
+        "GNGGA,120000.00,5101.0,N,00342.0,E,4,14,0.9,73.8,F,45.0,M,0.8,",   // feet
+        "GNGGA,120000.00,5101.0,N,00342.0,E,4,14,0.9,22.5,M,147.6,F,0.8,",  // feet
+        "GNGGA,120000.00,5101.0,N",                                         // cut short
+        "GNRMC,120000.00,A,5101.0,N,00342.0,E,0,0,310224,,,D",              // 31 February
         "GNGST,120000.00,,,,,-0.01,0.01,0.02"}) {
     Skips skips;
     EXPECT_TRUE(decode(sentence(text), {}, &skips).empty()) << text;

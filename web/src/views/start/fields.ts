@@ -1,11 +1,15 @@
 /// What a column of a flight's tables can be, and the names under which loggers write it. No DOM.
-import { degrees_kind, type Table } from './table_file';
+import { hemisphere_column } from './meaning';
+import { beyond, degrees_kind, MOST_LOCAL_M, numbers_of, type Table } from './table_file';
 
 /// Without those that `missing_*` names there is no flight.
 export const TRACK_FIELDS = [
   'time',
+  'zone',
   'lat',
   'lon',
+  'lat_hemisphere',
+  'lon_hemisphere',
   'height',
   'separation',
   'x',
@@ -14,17 +18,21 @@ export const TRACK_FIELDS = [
   'fix',
   'sigma_h',
   'sigma_v',
+  'heading',
 ] as const;
-export const RANGE_FIELDS = ['time', 'anchor', 'range', 'tag', 'rss', 'rx', 'fp', 'seq'] as const;
+export const RANGE_FIELDS = ['time', 'zone', 'anchor', 'range', 'tag', 'rss', 'rx', 'fp', 'seq'] as const;
 export type TrackField =
-  (typeof TRACK_FIELDS)[number] | 'sigma_e' | 'sigma_n' | 'age' | 'satellites' | 'heading' | 'qx' | 'qy' | 'qz' | 'qw';
+  (typeof TRACK_FIELDS)[number] | 'sigma_e' | 'sigma_n' | 'age' | 'satellites' | 'qx' | 'qy' | 'qz' | 'qw';
 export type RangeField = (typeof RANGE_FIELDS)[number] | 'antenna' | 'kind';
 export type Field = TrackField | RangeField;
 export type Columns = Readonly<Partial<Record<Field, string>>>;
 export const FIELD_WORDS: Record<(typeof TRACK_FIELDS)[number] | (typeof RANGE_FIELDS)[number], string> = {
   time: 'Time',
+  zone: 'Zone of the time',
   lat: 'Latitude, °',
   lon: 'Longitude, °',
+  lat_hemisphere: 'N or S',
+  lon_hemisphere: 'E or W',
   height: 'Height, m',
   separation: 'Height of the geoid, m',
   x: 'x or easting, m',
@@ -33,6 +41,7 @@ export const FIELD_WORDS: Record<(typeof TRACK_FIELDS)[number] | (typeof RANGE_F
   fix: 'Fix class',
   sigma_h: 'σ horizontal, m',
   sigma_v: 'σ vertical, m',
+  heading: 'Heading',
   anchor: 'Anchor',
   range: 'Range',
   tag: 'Tag',
@@ -46,8 +55,15 @@ const TIMES =
   'gpst gps_time unix datetime date_time zeit';
 export const NAMES: Readonly<Record<Field, string>> = {
   time: TIMES,
+  zone: 'tz timezone time_zone utc_offset tz_offset gmt_offset zeitzone',
   lat: 'lat_deg lat latitude latitude_deg breite',
   lon: 'lon_deg lon lng longitude longitude_deg laenge',
+  lat_hemisphere:
+    'n_s ns lat_dir latitude_dir lat_direction latitude_direction lat_ref latitude_ref lat_hemi lat_hemisphere latitude_hemisphere lat_ns north_south ' +
+    'ns_indicator n_s_indicator hemisphere',
+  lon_hemisphere:
+    'e_w ew lon_dir longitude_dir lon_direction longitude_direction lon_ref longitude_ref lon_hemi lon_hemisphere longitude_hemisphere lon_ew east_west ' +
+    'ew_indicator e_w_indicator lng_dir lng_ref hemisphere',
   height:
     'h_m h_ell h_ell_m height_ell hoehe_ell ell_height ellipsoidal_height height_ellipsoid ' +
     'height_ellipsoid_m ellipsoid_height altitude_ellipsoid_m alt_ellipsoid alt_hae hae ' +
@@ -99,20 +115,32 @@ function guessed(t: Table, fields: readonly Field[]): Columns {
   return out;
 }
 export function guessed_track(t: Table): Columns {
-  const { lat, lon, height, ...rest } = guessed(t, [
-    ...TRACK_FIELDS,
-    'sigma_e',
-    'sigma_n',
-    'age',
-    'satellites',
-    'heading',
-    'qx',
-    'qy',
-    'qz',
-    'qw',
-  ]);
-  // Easting and northing have a height beside them; so have columns called latitude and longitude that hold metres.
-  if (lat && lon && !(height && degrees_kind(t, lat, lon) === 'no_degrees'))
+  const {
+      lat,
+      lon,
+      height,
+      lat_hemisphere: _lat,
+      lon_hemisphere: _lon,
+      ...named
+    } = guessed(t, [...TRACK_FIELDS, 'sigma_e', 'sigma_n', 'age', 'satellites', 'qx', 'qy', 'qz', 'qw']),
+    north = hemisphere_column(t, lat, 'lat'),
+    east = hemisphere_column(t, lon, 'lon'),
+    rest = {
+      ...named,
+      ...(north ? { lat_hemisphere: north } : {}),
+      ...(east ? { lon_hemisphere: east } : {}),
+    };
+  // Easting and northing have a height beside them; so have columns called latitude and longitude that hold metres. What is near zero and no degree may be
+  // degrees and minutes, or one for the other: a person says it.
+  if (
+    lat &&
+    lon &&
+    !(
+      height &&
+      degrees_kind(t, lat, lon) === 'no_degrees' &&
+      [lat, lon].some((c) => beyond(numbers_of(t, c), MOST_LOCAL_M))
+    )
+  )
     return { ...rest, lat, lon, ...(height ? { height } : {}) };
   if (lat && lon) return { ...rest, x: lon, y: lat, z: height! };
   return rest.x && rest.y && !rest.z && height

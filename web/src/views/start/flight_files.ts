@@ -2,10 +2,20 @@
 import type { Wire } from '../../api/contract';
 import { num, obj, str } from '../../live/messages';
 import { is_local, missing_ranges, missing_track, type Columns, type Field } from './fields';
-import { height_unit_of, heights_of, MOST_LOCAL_M, place_kind, type Heights } from './places';
-import { number_of, type Table } from './table_file';
 import {
-  address_of,
+  heading_kind,
+  hemisphere_sign,
+  may_be_hexadecimal,
+  north_deg,
+  unit_column,
+  with_zone,
+  written_address,
+  type AddressKind,
+  type HeadingKind,
+} from './meaning';
+import { height_unit_of, heights_of, place_kind, type Heights } from './places';
+import { MOST_LOCAL_M, number_of, type Table } from './table_file';
+import {
   fix_numbers,
   fix_of,
   is_address,
@@ -83,6 +93,9 @@ export interface Reading {
   readonly crs: string | null; ///< of x, y, z, as the server reads it; empty: a frame of their own, or degrees
   readonly heights: Heights | null;
   readonly height: LengthUnit;
+  readonly heading: HeadingKind | null; ///< null: a person has to say it
+  readonly addresses: AddressKind | null; ///< null: a person has to say it
+  readonly wrong_unit: string; ///< what a column of units says that is not read; empty: nothing
 }
 export function guessed_reading(
   track: Table,
@@ -91,26 +104,54 @@ export function guessed_reading(
   rc: Columns,
   declared: Declared | null,
 ): Reading {
-  const kind = place_kind(track, tc);
+  const kind = place_kind(track, tc),
+    of_ranges = unit_column(ranges, rc, 'range'),
+    of_heights = unit_column(track, tc, is_local(tc) ? 'z' : 'height'),
+    others = (['separation', 'x', 'y'] as const).map((f) => [f, unit_column(track, tc, f)] as const),
+    wrong =
+      of_ranges && !of_ranges.unit
+        ? ([ranges, rc.range, of_ranges] as const)
+        : of_heights && !of_heights.unit
+          ? ([track, is_local(tc) ? tc.z : tc.height, of_heights] as const)
+          : others.flatMap(([f, u]) => (u && u.unit !== 'm' ? [[track, tc[f], u] as const] : []))[0];
   return {
     track_time: time_reading(track, tc.time),
     range_time: time_reading(ranges, rc.time),
-    range: range_unit(ranges, rc.range),
+    range: of_ranges?.unit ?? range_unit(ranges, rc.range),
     fix: tc.fix === undefined ? 'words' : fix_numbers(track, tc.fix, declared !== null),
     crs: declared?.crs ?? (kind === 'map' ? null : kind === 'ecef' ? 'ECEF' : ''),
     // Those of a flight folder are ellipsoidal.
     heights: declared ? (declared.heights ?? 'ellipsoidal') : heights_of(track, tc),
-    height: height_unit_of(track, tc, kind),
+    height: of_heights?.unit ?? height_unit_of(track, tc, kind),
+    heading:
+      declared?.heading || (['qx', 'qy', 'qz', 'qw'] as const).every((f) => tc[f])
+        ? 'deg'
+        : heading_kind(track, tc.heading),
+    addresses: may_be_hexadecimal(ranges, rc.anchor) || may_be_hexadecimal(ranges, rc.tag) ? null : 'names',
+    wrong_unit: wrong
+      ? `${wrong[0].name}: the column '${wrong[2].name}' says that '${wrong[1]}' is in ${wrong[2].word}: write it in metres`
+      : '',
   };
 }
 /// What a person has to say before a flight can be read: fields without a column, and what no name shows.
-export type Need = Field | 'time of the ranges' | 'tag address' | 'fix numbers' | 'degrees' | 'crs' | 'heights';
+export type Need =
+  | Field
+  | 'time of the ranges'
+  | 'tag address'
+  | 'fix numbers'
+  | 'heading'
+  | 'addresses'
+  | 'degrees'
+  | 'crs'
+  | 'heights';
 export function needs_of(track: Table, tc: Columns, rc: Columns, reading: Reading, tag: string): readonly Need[] {
   return [
     ...missing_track(tc),
     ...missing_ranges(rc).map((f) => (f === 'time' ? 'time of the ranges' : f)),
     ...(rc.tag || tag ? [] : (['tag address'] as const)),
     ...(reading.fix === null ? (['fix numbers'] as const) : []),
+    ...(reading.heading === null ? (['heading'] as const) : []),
+    ...(reading.addresses === null ? (['addresses'] as const) : []),
     ...(place_kind(track, tc) === 'no_degrees' ? (['degrees'] as const) : []),
     ...(reading.crs === null ? (['crs'] as const) : []),
     ...(heights_matter(tc, reading.crs) && reading.heights === null ? (['heights'] as const) : []),
@@ -123,6 +164,11 @@ export const heights_matter = (tc: Columns, crs: string | null): boolean =>
 const cell_at = (t: Table, c: Columns, f: Field): ((row: readonly string[]) => string) => {
   const at = c[f] === undefined ? -1 : t.columns.indexOf(c[f]);
   return (row) => row[at] ?? '';
+};
+
+const time_at = (t: Table, c: Columns, how: TimeReading): ((row: readonly string[]) => string) => {
+  const [time, zone] = [cell_at(t, c, 'time'), cell_at(t, c, 'zone')];
+  return (row) => (how.unit === 'date' ? with_zone(time(row), zone(row)) : time(row));
 };
 
 export interface Overlap {
@@ -140,7 +186,7 @@ export function overlap_of(
   epoch_ms: number,
 ): Overlap | null {
   const times = (t: Table, c: Columns, how: TimeReading): number[] => {
-      const cell = cell_at(t, c, 'time');
+      const cell = time_at(t, c, how);
       return t.rows.map((row) => time_us(cell(row), how, t.decimal, epoch_ms)).filter(Number.isFinite);
     },
     ends = (us: readonly number[]): [number, number] => [
@@ -195,6 +241,9 @@ export function flight_of(
   const missing = [...missing_track(tc), ...missing_ranges(rc)];
   if (missing.length) throw new Error(`no column is chosen for ${missing.join(', ')}`);
   if (reading.fix === null) throw new Error('the meaning of the numbers of the fix class is not chosen');
+  if (reading.heading === null) throw new Error('the unit of the heading is not chosen');
+  if (reading.addresses === null) throw new Error('it is not chosen how addresses are written');
+  if (reading.wrong_unit) throw new Error(reading.wrong_unit);
   if (reading.crs === null) throw new Error('the coordinate system of x, y, z is not chosen');
   if (heights_matter(tc, reading.crs) && reading.heights === null)
     throw new Error('the reference of the heights is not chosen');
@@ -249,13 +298,24 @@ function fixes_of(
       const cell = text(f);
       return (row) => num(number_of(cell(row), t.decimal));
     },
-    time = text('time'),
+    time = time_at(t, c, reading.track_time),
+    /// By the letter of its hemisphere; null where it has none, or a sign that says the other one.
+    signed = (f: 'lat_hemisphere' | 'lon_hemisphere') => {
+      const letter = text(f);
+      return (row: readonly string[], v: number | null | undefined): number | null | undefined => {
+        if (v == null || local || c[f] === undefined) return v;
+        const sign = hemisphere_sign(letter(row));
+        return sign === null || (v < 0 && sign > 0) ? null : sign * Math.abs(v);
+      };
+    },
+    [east, north] = [signed('lon_hemisphere'), signed('lat_hemisphere')],
     place = (local ? (['x', 'y', 'z'] as const) : (['lon', 'lat', 'height'] as const)).map(value),
     own_frame = local && reading.crs === '',
     per_degree = place_kind(t, c) === 'degrees_1e7' ? 1e7 : 1,
     separation = reading.heights === 'column' && heights_matter(c, reading.crs) ? value('separation') : () => 0,
     at_of = (row: readonly string[]): readonly [number, number, number] | null => {
-      const [x, y, z] = place.map((p) => p(row)),
+      const [x_read, y_read, z] = place.map((p) => p(row)),
+        [x, y] = [east(row, x_read), north(row, y_read)],
         geoid = separation(row);
       if (x == null || y == null || z == null || geoid === null) return null;
       return [x / (local ? 1 : per_degree), y / (local ? 1 : per_degree), z / PER_METRE[reading.height] + geoid];
@@ -271,14 +331,22 @@ function fixes_of(
     },
     fix = text('fix'),
     [h, v, e, n] = (['sigma_h', 'sigma_v', 'sigma_e', 'sigma_n'] as const).map(value),
+    wrong_sigma = (row: readonly string[]): string =>
+      [h, v, e, n].some((sigma) => {
+        const value = sigma!(row);
+        return value !== null && !(value >= 1e-5 && value <= 1000);
+      })
+        ? 'the standard deviation is not 0.00001 to 1000 m'
+        : '',
     q = (['qx', 'qy', 'qz', 'qw'] as const).map(value),
     [age, satellites] = (['age', 'satellites'] as const).map(value),
     declared_at = declared?.heading ? t.columns.indexOf(declared.heading.column) : -1,
     own_heading = value('heading'),
+    turned = (v: number | null): number | null => (v === null ? null : north_deg(v, reading.heading ?? 'deg')),
     heading = (row: readonly string[]): number | null =>
       declared?.heading
         ? num(90 - (number_of(row[declared_at] ?? '', t.decimal) + declared.heading.add_deg))
-        : own_heading(row);
+        : turned(own_heading(row));
   /// No column: motion capture, and rovers that write nothing but RTK fixed; the page says so before it is sent.
   const class_of = (row: readonly string[]): string => {
     if (c.fix === undefined) return 'fixed';
@@ -290,7 +358,7 @@ function fixes_of(
     const t_us = time_us(time(row), reading.track_time, t.decimal, about.epoch_ms),
       at = at_of(row),
       wrong = Number.isFinite(t_us)
-        ? wrong_place(at)
+        ? wrong_place(at) || wrong_sigma(row)
         : `"${time(row)}" is not a time that can be read (like 2026-05-04 10:00:01.5)`;
     if (at === null || wrong) {
       refused.push(`${t.name} row ${i + 2}: ${wrong}`);
@@ -324,13 +392,15 @@ function ranges_of(
   refused: string[],
 ): { t_us: number; tag: string }[] {
   const text = (f: Field) => cell_at(t, c, f),
-    [time, range, anchor, tag_cell, kind] = (['time', 'range', 'anchor', 'tag', 'kind'] as const).map(text),
+    time = time_at(t, c, reading.range_time),
+    how = reading.addresses ?? 'names',
+    [range, anchor, tag_cell, kind] = (['range', 'anchor', 'tag', 'kind'] as const).map(text),
     more = (['rss', 'rx', 'fp', 'seq', 'antenna'] as const).map((f) => ({
       name: { rss: 'rss_dbm', rx: 'rx_dbm', fp: 'fp_dbm', seq: 'seq', antenna: 'antenna' }[f],
       cell: text(f),
     }));
   return t.rows.flatMap((row, i) => {
-    const t_us = time_us(time!(row), reading.range_time, t.decimal, about.epoch_ms),
+    const t_us = time_us(time(row), reading.range_time, t.decimal, about.epoch_ms),
       distance = number_of(range!(row), t.decimal),
       who = anchor!(row),
       tag = tag_cell!(row) || about.tag,
@@ -339,7 +409,7 @@ function ranges_of(
         : !who
           ? 'no anchor'
           : !Number.isFinite(t_us)
-            ? `"${time!(row)}" is not a time that can be read (like 2026-05-04 10:00:01.5)`
+            ? `"${time(row)}" is not a time that can be read (like 2026-05-04 10:00:01.5)`
             : !Number.isFinite(distance)
               ? 'no range'
               : '';
@@ -347,8 +417,8 @@ function ranges_of(
       refused.push(`${t.name} row ${i + 2}: ${wrong}`);
       return [];
     }
-    const address = address_of(who);
-    if (!is_address(who)) {
+    const address = written_address(who, how);
+    if (!is_address(who) && Number(`0x${who}`) !== Number(address)) {
       const other = names.get(address) ?? who;
       if (other !== who) throw new Error(`the names "${who}" and "${other}" give the same address: rename one of them`);
       names.set(address, who);
@@ -356,7 +426,7 @@ function ranges_of(
     return [
       {
         t_us,
-        tag: address_of(tag),
+        tag: written_address(tag, how),
         anchor: address,
         distance_m: distance / PER_METRE[reading.range],
         ...(kind!(row) ? { kind: kind!(row) } : {}),

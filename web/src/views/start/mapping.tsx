@@ -31,6 +31,7 @@ import {
   type Overlap,
   type Reading,
 } from './flight_files';
+import { ADDRESS_KINDS, HEADING_KINDS, unused_columns } from './meaning';
 import { HEIGHT_WORDS, place_kind } from './places';
 import { anchor_columns, sample_of, with_a_row_for_each_range, type Table } from './table_file';
 import { FIX_NUMBERS, LENGTH_UNITS, TIME_UNITS, type TimeReading } from './values';
@@ -50,7 +51,10 @@ const field_words = (f: Field | 'time of the ranges'): string =>
 const NEED_WORDS = {
   'tag address': 'the tag',
   'fix numbers': 'the meaning of the numbers of the fix class',
-  degrees: 'latitude and longitude in degrees, or x and y of a map',
+  heading: 'unit and direction of the heading',
+  addresses: 'how addresses are written',
+  degrees:
+    'latitude and longitude in decimal degrees (degrees and minutes, or one for the other?), or x and y of a map',
   crs: 'the coordinate system of x, y, z',
   heights: 'what the heights are above',
 };
@@ -76,10 +80,8 @@ export function Mapping({ found, back }: { found: Found; back: () => void }) {
     [share, set_share] = useState<number | null>(null),
     [problem, set_problem] = useState('');
   // A few seconds of work for a flight of hours: only where what it rests on changes.
-  const reading = useMemo<Reading>(
-      () => ({ ...guessed_reading(track, tc, ranges, rc, declared), ...given }),
-      [track, tc, ranges, rc, declared, given],
-    ),
+  const asked = useMemo(() => guessed_reading(track, tc, ranges, rc, declared), [track, tc, ranges, rc, declared]),
+    reading = useMemo<Reading>(() => ({ ...asked, ...given }), [asked, given]),
     kind = useMemo(() => place_kind(track, tc), [track, tc]),
     above_something = heights_matter(tc, reading.crs),
     needs = needs_of(track, tc, rc, reading, about.tag),
@@ -90,6 +92,13 @@ export function Mapping({ found, back }: { found: Found; back: () => void }) {
     overlap = useMemo(
       () => (complete ? overlap_of(track, tc, ranges, rc, reading, about.epoch_ms) : null),
       [complete, track, tc, ranges, rc, reading, about.epoch_ms],
+    ),
+    unused = useMemo(
+      () =>
+        track === ranges
+          ? unused_columns(track, [tc, rc])
+          : [...unused_columns(track, [tc]), ...unused_columns(ranges, [rc])],
+      [track, tc, ranges, rc],
     ),
     wide =
       !rc.anchor && !rc.range ? anchor_columns(ranges, Object.values({ ...rc, ...(track === ranges ? tc : {}) })) : [];
@@ -181,6 +190,12 @@ export function Mapping({ found, back }: { found: Found; back: () => void }) {
           />
         </div>
       </details>
+      {unused.length > 0 && (
+        <p class="mut" data-testid="import-unused">
+          Columns that are not used: {unused.slice(0, 20).join(', ')}
+          {unused.length > 20 ? ` and ${unused.length - 20} more` : ''}.
+        </p>
+      )}
       <div class="fields">
         <TimeFields
           label="Times of the track"
@@ -201,13 +216,31 @@ export function Mapping({ found, back }: { found: Found; back: () => void }) {
           words={LENGTH_UNITS}
           set={(range) => set_given({ ...given, range })}
         />
-        {tc.fix !== undefined && reading.fix !== 'words' && (
+        {tc.fix !== undefined && asked.fix !== 'words' && (
           <Choice
             label="Numbers of the fix class"
             id="fix-numbers"
             value={reading.fix}
             words={FIX_NUMBERS}
             set={(fix) => set_given({ ...given, fix })}
+          />
+        )}
+        {asked.heading === null && (
+          <Choice
+            label={`Heading, column ${tc.heading}`}
+            id="import-heading"
+            value={reading.heading}
+            words={HEADING_KINDS}
+            set={(heading) => set_given({ ...given, heading })}
+          />
+        )}
+        {asked.addresses === null && (
+          <Choice
+            label="Addresses are"
+            id="import-addresses"
+            value={reading.addresses}
+            words={ADDRESS_KINDS}
+            set={(addresses) => set_given({ ...given, addresses })}
           />
         )}
       </div>

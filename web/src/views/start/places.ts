@@ -1,10 +1,8 @@
 /// Where a track's numbers are: degrees, a local frame, a map, the earth's centre; and above what its heights are. No DOM.
 import { is_local, plain, type Columns } from './fields';
-import { beyond, degrees_kind, numbers_of, type DegreesKind, type Table } from './table_file';
+import { beyond, degrees_kind, MOST_LOCAL_M, numbers_of, type DegreesKind, type Table } from './table_file';
 import { unit_of_name, type LengthUnit } from './values';
 
-/// Metres from zero beyond which a frame is none of its own, as of the rows of the API.
-export const MOST_LOCAL_M = 1e5;
 /// `map`: metres far from any zero of one's own.
 export type PlaceKind = DegreesKind | 'local' | 'map' | 'ecef';
 

@@ -96,6 +96,8 @@ export const numbers_of = (t: Table, column: string | undefined): readonly numbe
     .map((x) => number_of(x, t.decimal))
     .filter(Number.isFinite);
 export const beyond = (values: readonly number[], most: number): boolean => values.some((v) => Math.abs(v) > most);
+/// Metres from zero beyond which a frame is none of its own, as of the rows of the API.
+export const MOST_LOCAL_M = 1e5;
 /// What columns of latitude and longitude hold: degrees, whole numbers of 1e-7 degrees, or something else.
 export type DegreesKind = 'degrees' | 'degrees_1e7' | 'no_degrees';
 export function degrees_kind(t: Table, lat: string, lon: string): DegreesKind {

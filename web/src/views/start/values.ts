@@ -51,7 +51,7 @@ const GPS_EPOCH_US = Date.UTC(1980, 0, 6) * 1000;
 const leaps_us = (us: number): number => (LEAPS.find(([day]) => us >= Date.parse(day) * 1000)?.[1] ?? 0) * 1e6;
 
 const DATE =
-  /^(\d{4})[-/.](\d\d?)[-/.](\d\d?)[T ]+(\d\d?):(\d\d):(\d\d)(?:[.,](\d+))?\s*(Z|UTC|GPST|[+-]\d\d:?\d\d)?$/i;
+  /^(\d{4})[-/.](\d\d?)[-/.](\d\d?)[T ]+(\d\d?):(\d\d):(\d\d)(?:[.,](\d+))?\s*(Z|UTC|GMT|GPST|[+-]\d\d:?\d\d)?$/i;
 /// Microseconds of a date without its zone; one that names none is of `scale`, never of this computer's own zone.
 function date_us(text: string): number {
   const m = DATE.exec(text);
@@ -73,7 +73,7 @@ export function time_us(cell: string, { unit, scale }: TimeReading, decimal: '.'
   }
   if (unit === 'date') {
     const us = date_us(cell),
-      gps = /GPST$/i.test(cell) || (scale === 'gps' && !/(Z|UTC|[+-]\d\d:?\d\d)$/i.test(cell));
+      gps = /GPST$/i.test(cell) || (scale === 'gps' && !/(Z|UTC|GMT|[+-]\d\d:?\d\d)$/i.test(cell));
     return gps ? us - leaps_us(us) : us;
   }
   const us = number_of(cell, decimal) * { s: 1e6, ms: 1e3, us: 1, ns: 1e-3 }[unit];
@@ -86,14 +86,18 @@ export function time_us(cell: string, { unit, scale }: TimeReading, decimal: '.'
 
 export type FixWord = 'none' | 'single' | 'dgps' | 'float' | 'fixed';
 /// What the numbers of a fix column mean. Who takes one for the other believes single positions as RTK fixed ones.
-export type FixNumbers = 'solution' | 'nmea' | 'rtklib' | 'mavlink';
-export const FIX_NUMBERS: Record<FixNumbers, string> = {
+/// `gnss`: words, and "FIX" alone is any fix of a receiver.
+export type FixNumbers = 'gnss' | 'solution' | 'nmea' | 'rtklib' | 'mavlink';
+export const FIX_NUMBERS: Record<FixNumbers | 'words', string> = {
+  gnss: 'words, and FIX is a position without RTK',
+  words: 'words, and FIX is RTK fixed',
   solution: '2 fixed, 1 float, 0 neither (u-blox carrSoln, flight folders)',
   nmea: '4 fixed, 5 float, 2 DGPS, 1 single (NMEA GGA)',
   rtklib: '1 fixed, 2 float, 4 DGPS, 5 single (RTKLIB, Emlid)',
   mavlink: '6 fixed, 5 float, 4 DGPS, 3 single (MAVLink GPS_FIX_TYPE)',
 };
 const BY_NUMBER: Record<FixNumbers, Readonly<Record<string, FixWord>>> = {
+  gnss: {},
   solution: { '0': 'single', '1': 'float', '2': 'fixed' },
   nmea: { '0': 'none', '1': 'single', '2': 'dgps', '3': 'single', '4': 'fixed', '5': 'float', '6': 'none' },
   rtklib: { '0': 'none', '1': 'fixed', '2': 'float', '3': 'dgps', '4': 'dgps', '5': 'single', '6': 'dgps' },
@@ -118,13 +122,20 @@ const BY_NAME: readonly (readonly [RegExp, FixNumbers])[] = [
 ];
 /// What the numbers of the column mean; `words` where it has none; null where a person has to say it.
 export function fix_numbers(t: Table, column: string, from_flight_folder: boolean): FixNumbers | 'words' | null {
-  const numbers = [...values_of(t, column)].filter((v) => /^\d+$/.test(v));
-  if (!numbers.length) return 'words';
+  const values = [...values_of(t, column)],
+    numbers = values.filter((v) => /^\d+$/.test(v));
+  // Receivers without RTK write FIX for any position; beside FLOAT it is the other state of RTK.
+  if (!numbers.length)
+    return values.some((v) => plain(v) === 'fix') &&
+      !values.some((v) => ['float', 'fixed'].includes(fix_of(v, 'gnss') ?? ''))
+      ? 'gnss'
+      : 'words';
   if (from_flight_folder && numbers.every((v) => v in BY_NUMBER.solution)) return 'solution';
   return BY_NAME.find(([name]) => name.test(plain(column)))?.[1] ?? null;
 }
 /// Null where the cell says nothing that is known.
 export function fix_of(cell: string, numbers: FixNumbers | 'words'): FixWord | null {
+  if (numbers === 'gnss' && plain(cell) === 'fix') return 'single';
   return (numbers === 'words' ? undefined : BY_NUMBER[numbers][cell]) ?? BY_WORD[plain(cell)] ?? null;
 }
 
