@@ -13,6 +13,7 @@
 #include <string_view>
 
 #include "core/base/angle.hpp"
+#include "core/base/text.hpp"
 
 namespace anchord::floor_plan {
 namespace {
@@ -130,25 +131,37 @@ bool names_walls(std::string_view layer) {
                              [&](std::string_view word) { return name.find(word) != std::string::npos; });
 }
 
-double unit_of(int code) {
-  switch (code) {
-    case 1:
-      return 0.0254;
-    case 2:
-      return 0.3048;
-    case 4:
-      return 0.001;
-    case 5:
-      return 0.01;
-    case 6:
-      return 1;
-    case 10:
-      return 0.9144;
-    case 14:
-      return 0.1;
-    default:
-      return 0;
-  }
+/// Metres of one unit, by $INSUNITS: DXF reference, header variables. 0: unitless; nothing: no unit of it.
+std::optional<double> unit_of(double code) {
+  constexpr double k_survey_foot_m = 1200.0 / 3937.0;
+  // Astronomical unit and parsec by resolutions B2 of the IAU, 2012 and 2015; a light year is a Julian one.
+  constexpr std::array<double, 25> k_metres{0,
+                                            0.0254,
+                                            0.3048,
+                                            1609.344,
+                                            0.001,
+                                            0.01,
+                                            1,
+                                            1000,
+                                            2.54e-8,
+                                            2.54e-5,
+                                            0.9144,
+                                            1e-10,
+                                            1e-9,
+                                            1e-6,
+                                            0.1,
+                                            10,
+                                            100,
+                                            1e9,
+                                            149597870700.0,
+                                            9460730472580800.0,
+                                            3.0856775814913673e16,
+                                            k_survey_foot_m,
+                                            k_survey_foot_m / 12,
+                                            3 * k_survey_foot_m,
+                                            5280 * k_survey_foot_m};
+  if (!(code >= 0 && code < k_metres.size())) return std::nullopt;
+  return k_metres[static_cast<std::size_t>(code)];
 }
 
 struct Block {
@@ -211,8 +224,15 @@ class Reader {
         continue;
       }
       if (section == "HEADER" && group->code == 9) variable = group->value;
-      if (section == "HEADER" && group->code == 70 && variable == "$INSUNITS")
-        out_.unit_m = unit_of(static_cast<int>(number(group->value)));
+      if (section == "HEADER" && group->code == 70 && variable == "$INSUNITS") {
+        const auto unit_m = unit_of(number(group->value));
+        if (!unit_m)
+          return make_error(Errc::unsupported,
+                            "$INSUNITS is " + to_utf8(group->value, 20) +
+                                ", which is no unit of the DXF reference: set the unit of the "
+                                "drawing in the CAD program and export it again");
+        out_.unit_m = *unit_m;
+      }
       if (record == "LAYER") layer.add(*group);
       if (block && group->code == 2) block_name = group->value;
       if (block && group->code == 10) block->base.x() = number(group->value);

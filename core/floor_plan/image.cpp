@@ -51,6 +51,7 @@ struct JpegFaults {
   std::jmp_buf back;
   char message[JMSG_LENGTH_MAX];
   bool cut_short;
+  bool of_print;  ///< CMYK
 };
 
 /// A progressive file has some ten scans. Each is a pass over the whole picture for a few bytes of file.
@@ -91,6 +92,11 @@ bool read_jpeg(Bytes bytes, Image& image, JpegFaults& faults) {
   jpeg.progress = &progress;
   jpeg_mem_src(&jpeg, reinterpret_cast<const unsigned char*>(bytes.data()), bytes.size());
   jpeg_read_header(&jpeg, TRUE);
+  if (jpeg.jpeg_color_space == JCS_CMYK || jpeg.jpeg_color_space == JCS_YCCK) {
+    jpeg_destroy_decompress(&jpeg);
+    faults.of_print = true;
+    return false;
+  }
   jpeg.out_color_space = JCS_RGB;
   jpeg_start_decompress(&jpeg);
   const std::size_t stride = 3 * std::size_t{jpeg.output_width};
@@ -108,7 +114,11 @@ bool read_jpeg(Bytes bytes, Image& image, JpegFaults& faults) {
 Result<Image> decode_jpeg(Bytes bytes, const ImageHead& head) {
   Image image = blank(head);
   auto faults = std::make_unique<JpegFaults>();
-  if (!read_jpeg(bytes, image, *faults)) return broken(faults->message);
+  if (const bool read = read_jpeg(bytes, image, *faults); !read && faults->of_print)
+    return make_error(Errc::unsupported,
+                      "the JPEG file has the colours of print (CMYK): save it as RGB, or as PNG");
+  else if (!read)
+    return broken(faults->message);
   if (faults->cut_short) return broken("it ends before the last row");
   return image;
 }

@@ -47,6 +47,33 @@ TEST(Dxf, HasItsUnitAndLines) {
   EXPECT_EQ(drawing(dxf::entities(dxf::line("0", 0, 0, 1, 0))).unit_m, 0) << "the file does not say";
 }
 
+// DXF reference, $INSUNITS; a survey foot is 1200/3937 m (NIST SP 811, B.6).
+TEST(Dxf, KnowsEveryUnitOfTheReferenceAndNoOther) {
+  const auto unit_m = [](int code) {
+    return drawing(dxf::header(code) + dxf::entities(dxf::line("0", 0, 0, 1, 0))).unit_m;
+  };
+  EXPECT_EQ(unit_m(0), 0) << "unitless";
+  for (const auto& [code, metres] : {std::pair{3, 1609.344},
+                                     {7, 1000.0},
+                                     {8, 2.54e-8},
+                                     {9, 2.54e-5},
+                                     {10, 0.9144},
+                                     {13, 1e-6},
+                                     {14, 0.1},
+                                     {16, 100.0},
+                                     {21, 1200.0 / 3937},
+                                     {22, 100.0 / 3937},
+                                     {23, 3600.0 / 3937},
+                                     {24, 6336000.0 / 3937}})
+    EXPECT_NEAR(unit_m(code) / metres, 1, 1e-12) << code;
+  for (const int code : {25, 70, -1}) {
+    const auto text = dxf::header(code) + dxf::entities(dxf::line("0", 0, 0, 1, 0));
+    const auto read = read_dxf(bytes(text));
+    ASSERT_FALSE(read.has_value()) << code;
+    EXPECT_NE(read.error().message.find("$INSUNITS is " + std::to_string(code)), std::string::npos);
+  }
+}
+
 // A bulge of 1 is half a circle: DXF reference, LWPOLYLINE group 42. Chords of 5 degrees are 0.03 % shorter.
 TEST(Dxf, BulgesAndCirclesAndArcsAreRound) {
   constexpr double k_pi = std::numbers::pi;

@@ -25,7 +25,8 @@ Image picture(int width, int height) {
   return image;
 }
 
-std::string jpeg_of(const Image& image) {
+/// Of 3 channels, or of 4 as a print shop saves it.
+std::string jpeg_of(const Image& image, J_COLOR_SPACE colours = JCS_RGB) {
   jpeg_compress_struct jpeg{};
   jpeg_error_mgr faults{};
   jpeg.err = jpeg_std_error(&faults);
@@ -35,12 +36,14 @@ std::string jpeg_of(const Image& image) {
   jpeg_mem_dest(&jpeg, &buffer, &size);
   jpeg.image_width = static_cast<JDIMENSION>(image.width_px);
   jpeg.image_height = static_cast<JDIMENSION>(image.height_px);
-  jpeg.input_components = 3;
-  jpeg.in_color_space = JCS_RGB;
+  const int channels = colours == JCS_CMYK ? 4 : 3;
+  jpeg.input_components = channels;
+  jpeg.in_color_space = colours;
   jpeg_set_defaults(&jpeg);
   jpeg_start_compress(&jpeg, TRUE);
   for (int y = 0; y < image.height_px; ++y) {
-    auto* row = const_cast<JSAMPROW>(image.pixels.data() + static_cast<std::size_t>(3 * y * image.width_px));
+    auto* row =
+        const_cast<JSAMPROW>(image.pixels.data() + static_cast<std::size_t>(channels * y * image.width_px));
     jpeg_write_scanlines(&jpeg, &row, 1);
   }
   jpeg_finish_compress(&jpeg);
@@ -48,6 +51,15 @@ std::string jpeg_of(const Image& image) {
   std::free(buffer);
   jpeg_destroy_compress(&jpeg);
   return out;
+}
+
+TEST(PlanImage, InColoursOfPrintIsRefusedWithWhatToDo) {
+  Image ink{40, 30, 4, std::vector<std::uint8_t>(std::size_t{4} * 40 * 30, 20)};
+  const auto jpeg = jpeg_of(ink, JCS_CMYK);
+  const auto read = decode_image(image_bytes(jpeg));
+  ASSERT_FALSE(read.has_value());
+  EXPECT_NE(read.error().message.find("(CMYK): save it as RGB, or as PNG"), std::string::npos)
+      << read.error().message;
 }
 
 TEST(PlanImage, OfEachFormatIsReadAsItWasWritten) {
