@@ -32,7 +32,13 @@ std::string dxf_text(std::string_view utf8) {
   for (std::size_t i = 0; i < utf8.size();) {
     const auto byte = static_cast<unsigned char>(utf8[i]);
     if (byte < 0x80) {
-      out += byte < 0x20 || byte == 0x7f ? ' ' : utf8[i];
+      // %%d is a degree sign to every CAD program, %%% a percent sign (AutoCAD, control codes of text).
+      if (utf8.substr(i, 2) == "%%" || (byte == '%' && out.ends_with('%')))
+        out += "%%%";
+      else if (byte == '^')
+        out += "^ ";  // ^J is a line end (DXF reference, control characters)
+      else
+        out += byte < 0x20 || byte == 0x7f ? ' ' : utf8[i];
       ++i;
       continue;
     }

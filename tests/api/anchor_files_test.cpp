@@ -5,6 +5,7 @@
 
 #include "api/exchange/anchor_tables.hpp"
 #include "api/exchange/step_text.hpp"
+#include "api/formats/report.hpp"
 #include "app_fixture.hpp"
 
 namespace anchord::test::anchor_files_test {
@@ -60,6 +61,22 @@ TEST_F(AnchorFiles, DxfHasALayerForEachFloorAlsoWhereNamesOfLayersCollide) {
   EXPECT_NE(got.body.find("\r\n1\r\nHal A, \"noord\" \\U+00E9\r\n"), std::string::npos) << "ASCII of R12";
   patch("0x6a3c", {{"floor", "0,5"}});
   EXPECT_NE(file("dxf").body.find("\r\n2\r\nFLOOR_0_5_2\r\n"), std::string::npos);
+}
+
+// AutoCAD reads %%d in a text as a degree sign, and %%% as a percent sign.
+TEST_F(AnchorFiles, DxfWritesPercentSignsAndCaretsThatNoProgramReadsAsACode) {
+  publish(true);
+  patch("0x6a2f", {{"name", "90%%d 5% ^J"}});
+  const auto got = file("dxf");
+  ASSERT_EQ(got.status, 200) << got.body;
+  EXPECT_NE(got.body.find("\r\n1\r\n90%%%%%%d 5% ^ J\r\n"), std::string::npos);
+}
+
+// XML 1.0, section 2.2: Char has neither of the last two code points of the plane, nor control characters.
+TEST(HtmlText, KeepsOutWhatXmlForbids) {
+  using api::html_text;
+  EXPECT_EQ(html_text("a\xEF\xBF\xBE|\xEF\xBF\xBF|\x01z"), "a\xEF\xBF\xBD|\xEF\xBF\xBD|z");
+  EXPECT_EQ(html_text("\xEF\xBF\xBD\xEF\xBC\xA1<"), "\xEF\xBF\xBD\xEF\xBC\xA1&lt;");
 }
 
 // ISO 10303-21, 6.4.3: quotes and backslashes are doubled, characters outside ASCII are \X2\ with UTF-16.

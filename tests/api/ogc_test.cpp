@@ -155,6 +155,25 @@ TEST_F(Ogc, ATrackOverTheDateLineStaysTogether) {
   EXPECT_EQ(items("tracks", {{"bbox", "179,-17,-179,-16"}})["numberReturned"], 1);
 }
 
+// Three times round the pole, 30 degrees each: added up they come to 1080.
+TEST_F(Ogc, ATrackRoundAPoleKeepsToLongitudesThatMapsHave) {
+  const auto id = mission();
+  std::string rows;
+  for (int i = 0; i < 36; ++i)
+    rows += R"({"t_us":)" + std::to_string(1777889472000000LL + i * 1000000LL) + R"(,"lon":)" +
+            std::to_string((30 * i + 180) % 360 - 180) + R"(,"lat":89.9999,"h_m":60.5,"fix":"fixed"})" + "\n";
+  ASSERT_EQ(post("/api/v1/fixes", rows, "application/x-ndjson", {{"mission", id}}).status, 200);
+  for (const Json& line : {items("tracks")["features"][0]["geometry"]["coordinates"],
+                           json(get("/api/v1/missions/" + id + "/track"))["geometry"]["coordinates"]}) {
+    ASSERT_EQ(line.size(), 36U);
+    for (std::size_t i = 0; i < line.size(); ++i) {
+      const double lon_deg = line[i][0];
+      EXPECT_LE(std::abs(lon_deg), 360) << i;
+      EXPECT_NEAR(std::remainder(lon_deg - 30.0 * static_cast<double>(i), 360), 0, 1e-9) << i;
+    }
+  }
+}
+
 TEST_F(Ogc, AFlightWithoutAPlaceOnTheGlobeHasNoGeometry) {
   mission("local");
   mission();  // without a position
