@@ -12,6 +12,7 @@
 #include "api/formats/flight_json.hpp"
 #include "api/formats/globe_track.hpp"
 #include "api/wire/exclusion_json.hpp"
+#include "api/wire/row_limits.hpp"
 #include "core/base/text.hpp"
 
 namespace anchord {
@@ -61,7 +62,7 @@ class PoseColumns {
 
   bool has_fix_class() const { return fix_.has_value(); }
 
-  /// Nothing: the pose is not finite. Errors name the line.
+  /// Nothing: the pose is not finite, or its standard deviations are none. Errors name the line.
   Result<std::optional<Fix>> read(const CsvTable& table, UtcTime time) const {
     Fix fix;
     fix.time = time;
@@ -87,8 +88,10 @@ class PoseColumns {
     BOOST_OUTCOME_TRY(fix.fix, fix_class(table));
     BOOST_OUTCOME_TRY(const auto sd_h, table.number(sd_h_));
     BOOST_OUTCOME_TRY(const auto sd_v, table.number(sd_v_));
-    if (sd_h && std::isfinite(*sd_h) && *sd_h > 0) {
-      const double up = sd_v && std::isfinite(*sd_v) && *sd_v > 0 ? *sd_v : 1.5 * *sd_h;
+    for (const auto& sigma : {sd_h, sd_v})
+      if (sigma && !api::row_limits::k_sigma_m.hold(*sigma)) return std::optional<Fix>{};
+    if (sd_h) {
+      const double up = sd_v.value_or(1.5 * *sd_h);
       fix.covariance_m2 = Eigen::Vector3d(*sd_h * *sd_h, *sd_h * *sd_h, up * up).asDiagonal().toDenseMatrix();
     }
     if (quaternion_[0]) {
@@ -169,8 +172,10 @@ Result<void> read_track(const std::filesystem::path& folder, const FlightDeclara
     }
   }
   if (not_finite > 0)
-    data.notes.push_back("track: " + std::to_string(not_finite) +
-                         " rows without a finite pose were left out");
+    data.notes.push_back(
+        "track: " + std::to_string(not_finite) +
+        " rows without a finite pose, or with a standard deviation outside 0.00001 to 1000 m, "
+        "were left out");
   return boost::outcome_v2::success();
 }
 

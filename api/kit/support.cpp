@@ -197,9 +197,24 @@ bool query_flag(const Request& request, const char* name) {
   return true;
 }
 
+/// RFC 9110 section 13.1.1: any of a list, by strong comparison, so W/"1" is not "1".
+bool names_etag(std::string_view list, std::string_view etag) {
+  while (!list.empty()) {
+    const auto begin = list.find_first_not_of(" \t,");
+    if (begin == std::string_view::npos) return false;
+    list.remove_prefix(begin);
+    const auto quote = list.find('"'),
+               close = quote == std::string_view::npos ? quote : list.find('"', quote + 1);
+    const auto end = close == std::string_view::npos ? list.find(',') : close + 1;
+    const auto one = list.substr(0, end);
+    if (one == etag || one == "*") return true;
+    list.remove_prefix(std::min(list.size(), one.size()));
+  }
+  return false;
+}
+
 void require_match(const Request& request, const std::string& etag) {
-  const auto wanted = request.header("if-match");
-  if (wanted == "*" || wanted.find(etag) != std::string_view::npos) return;
+  if (names_etag(request.header("if-match"), etag)) return;
   Response response =
       problem(412, "precondition-failed", "the resource changed since it was read; its ETag is now " + etag);
   response.header("ETag", etag);

@@ -1,5 +1,6 @@
 #include <CLI/CLI.hpp>
 #include <cstdio>
+#include <filesystem>
 #include <nlohmann/json.hpp>
 
 #include "core/base/text.hpp"
@@ -103,7 +104,12 @@ int check(const BackupOptions& options) {
   const auto cirs = check_backup_cirs(options.file);
   if (!cirs) return failed_by(cirs.error());
   if (!cirs.value().missing.empty()) return report_missing(options.file, cirs.value().missing);
-  std::printf("%s is complete\n", options.file.c_str());
+  std::error_code ignored;
+  if (std::filesystem::exists(options.file + ".sha256", ignored))
+    std::printf("%s is complete\n", options.file.c_str());
+  else
+    std::printf("%s is a whole database; no digest was compared: %s.sha256 is not there\n",
+                options.file.c_str(), options.file.c_str());
   print_cirs(cirs.value().files, cirs.value().bytes);
   return 0;
 }

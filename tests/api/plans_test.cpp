@@ -50,6 +50,23 @@ TEST_F(Plans, AreStoredAndComeBackAsTheyWere) {
   EXPECT_EQ(json(get("/api/v1/plans"))["items"].size(), 1u);
 }
 
+// RFC 9110, 13.1.1.
+TEST_F(Plans, AreChangedWhereOneOfAListOfETagsIsTheirs) {
+  const auto path = "/api/v1/plans/" + make(hall())["id"].get<std::string>();
+  const auto patch = [&](const std::string& tags) {
+    Call options;
+    options.type = "application/merge-patch+json";
+    options.headers["if-match"] = tags;
+    return call(api::Method::patch, path, R"({"name":"Hall B"})", options).status;
+  };
+  for (const auto* none : {R"("x", "y")", R"(W/"p-1")", R"("p-11")", R"("x\"p-1\"y")", "p-1", R"("p-1)"})
+    EXPECT_EQ(patch(none), 412) << none;
+  EXPECT_EQ(patch(R"("x", "p-1")"), 200);
+  EXPECT_EQ(patch(R"("p-2","x")"), 200);
+  EXPECT_EQ(patch(R"(W/"x" , "p-3")"), 200);
+  EXPECT_EQ(patch("*"), 200);
+}
+
 TEST_F(Plans, WhatWasGotCanBePutBack) {
   Json plan = make(hall());
   const auto path = "/api/v1/plans/" + plan["id"].get<std::string>();

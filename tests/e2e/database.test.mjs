@@ -173,6 +173,8 @@ test('impulse responses in files go along with a backup and with a copy, and are
   const elsewhere = join(folder, 'elsewhere');
   const restored = await run(['backup', 'restore', file, '--data-dir', elsewhere]);
   assert.equal(restored.code, 0, restored.stderr);
+  rmSync(`${file}.sha256`);
+  assert.match((await run(['backup', 'check', file])).stdout, /no digest was compared/);
   assert.deepEqual(files(elsewhere), files(flown));
   server = await startServer({ dataDir: elsewhere });
   assert.equal(await digest(server), before);

@@ -69,6 +69,23 @@ TEST_F(FlightFolder, ReadsATrackOnTheGlobe) {
   EXPECT_EQ(flight.ranges[0].tag, flight.mission.tags[0].tag);
 }
 
+TEST_F(FlightFolder, LeavesPositionsOfAbsurdStandardDeviationsOutAndCountsThem) {
+  globe();
+  write("track.csv",
+        "t_s,lat_deg,lon_deg,alt_m,fix,sd_h_m,sd_v_m,yaw\n0,50,4,80,2,0.01,0.02,60\n1,50,4,80,2,0,0.02,60\n"
+        "2,50,4,80,2,-1,0.02,60\n3,50,4,80,2,nan,0.02,60\n4,50,4,80,2,inf,0.02,60\n5,50,4,80,2,0.01,0,60\n"
+        "6,50,4,80,2,,,60\n");
+  const auto flight = read_flight_folder(folder_);
+  ASSERT_TRUE(flight) << flight.error().message;
+  ASSERT_EQ(flight.value().fixes.size(), 2U);
+  EXPECT_FALSE(flight.value().fixes[1].covariance_m2) << "nothing was said of it";
+  std::string notes;
+  for (const auto& note : flight.value().notes) notes += note;
+  EXPECT_NE(notes.find("track: 5 rows without a finite pose, or with a standard deviation"),
+            std::string::npos)
+      << notes;
+}
+
 TEST_F(FlightFolder, RefusesMapCoordinatesAsALocalFrameOrAsDegrees) {
   write("flight.json", R"({"track": {"frame": "local", "point": "body"}})");
   write("ranges.csv", "t_s,anchor_id,range_m\n0.1,3,6.14\n");
