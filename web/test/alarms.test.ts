@@ -24,6 +24,7 @@ const calm: Situation = {
 };
 const ids = (list: readonly Alarm[]): string[] => list.map((a) => a.id);
 
+const screen = { mission: 'm', name: (id: string): string => id };
 describe('Conditions', () => {
   it('say nothing while all is well', () => expect(new Conditions().standing(calm)).toEqual([]));
   it('raise rtk.lost after 2 s below FLOAT and rtk.float after 5 s of FLOAT', () => {
@@ -94,10 +95,44 @@ describe('Conditions', () => {
   });
   it('of the server stay in the list while the link is lost, as they were when last seen', () => {
     const server = [
-      { id: 'disk.low', priority: 'warning' as const, since_us: 0, text: 'Disk is low', acknowledged: false },
+      {
+        id: 'disk.low',
+        priority: 'warning' as const,
+        since_us: 0,
+        text: 'Disk is low',
+        acknowledged: false,
+        mission: null,
+      },
     ];
-    const [a] = merged([], server, 1, 1, true);
+    const [a] = merged([], server, 1, 1, true, screen);
     expect([a!.title, a!.acknowledged]).toEqual(['Disk is low, when last seen', true]);
+  });
+  it('of another flight stand beside those of the flight on the screen, with its name', () => {
+    const of = (mission: string | null, id: string, text: string) => ({
+      id,
+      priority: 'critical' as const,
+      since_us: 0,
+      text,
+      acknowledged: false,
+      mission,
+    });
+    const list = merged(
+      [],
+      [
+        of('m2', 'drone.link', 'aircraft silent'),
+        of('m1', 'drone.link', 'aircraft silent for 4 s'),
+        of(null, 'disk.low', 'disk is low'),
+      ],
+      1,
+      1,
+      false,
+      { mission: 'm1', name: (id) => `number ${id}` },
+    );
+    expect(list.map((a) => [a.id, a.title])).toEqual([
+      ['drone.link of m2', 'Flight number m2: Aircraft silent'],
+      ['drone.link', 'Aircraft silent for 4 s'],
+      ['disk.low', 'Disk is low'],
+    ]);
   });
   it('are listed once per id with the word of the server, critical first', () => {
     const own = new Conditions();
@@ -105,17 +140,20 @@ describe('Conditions', () => {
     const list = merged(
       own.standing({ ...calm, fix: 'none', now_ms: 3000 }),
       [
-        { id: 'disk.low', priority: 'warning', since_us: 0, text: 'Disk is low', acknowledged: false },
+        { id: 'disk.low', priority: 'warning', since_us: 0, text: 'Disk is low', acknowledged: false, mission: null },
         {
           id: 'rtk.lost',
           priority: 'critical',
           since_us: 1_000_000,
           text: 'RTK lost at the server',
           acknowledged: true,
+          mission: null,
         },
       ],
       3_000_000,
       3000,
+      false,
+      screen,
     );
     expect(list.map((a) => [a.id, a.title, a.acknowledged])).toEqual([
       ['rtk.lost', 'RTK lost at the server', true],

@@ -79,6 +79,7 @@ beforeEach(() => {
     data: (_t, d) => log.push(`data ${(d as { n: number }).n}`),
     gap: (_t, n) => log.push(`gap ${n}`),
     restarted: () => log.push('restarted'),
+    server: () => 0,
     resumed: (n, again) => log.push(`resumed ${[...n].map(([t, k]) => `${t} ${k}`).join()} ${again}`),
     link: (s) => links.push(s),
     refused: () => log.push('refused'),
@@ -99,7 +100,7 @@ describe('LiveClient', () => {
   });
   it('subscribes only to what the server offers', () => {
     const c = new LiveClient(['events', 'mission.turn'], world.environment);
-    c.start({ snap() {}, data() {}, gap() {}, restarted() {}, resumed() {}, link() {}, refused() {} });
+    c.start({ snap() {}, data() {}, gap() {}, restarted() {}, server() {}, resumed() {}, link() {}, refused() {} });
     hello();
     expect(world.socket.sent.filter((x) => x.op === 'sub').map((x) => x.topic)).toEqual(['events']);
   });

@@ -6,6 +6,7 @@ import { describe, expect, it } from 'vitest';
 /// frame does not, or not all of them. `none`: shows no value of it.
 const STRUCK_BY: Readonly<Record<string, 'frame' | 'asks' | 'none'>> = {
   'ui/alarms.tsx': 'asks',
+  'ui/app.tsx': 'none', // whether the aircraft is in the air
   'ui/keyboard.ts': 'none',
   'ui/strip.tsx': 'asks',
   'views/anchor_card.tsx': 'asks',

@@ -275,6 +275,7 @@ export class LiveClient implements LiveSource {
     const again = this.epoch !== null;
     const restarted = again && this.epoch !== str(m.epoch);
     this.epoch = str(m.epoch);
+    this.sink?.server(str(m.server));
     const t_us = num(m.t_us);
     if (t_us !== null) this.clock_bounds(t_us - this.env.wall_us(), null); // the snapshots that follow have ages
     if (restarted) {

@@ -56,7 +56,7 @@ export interface DeviceMsg extends Readonly<Pick<Topic<'devices'>, 'kind' | 'sta
 type Counted = 'queue_depth' | 'db_bytes' | 'disk_free_bytes' | 'ws_clients';
 export type SystemMsg = Readonly<Omit<Topic<'system'>, Counted>> & { readonly [K in Counted]: number | null };
 export type EventMsg = Readonly<Topic<'events'>>;
-export type AlarmMsg = Readonly<Omit<Topic<'alarms'>, 'mission'>>;
+export type AlarmMsg = Readonly<Omit<Topic<'alarms'>, 'mission'>> & { readonly mission: string | null }; ///< null: of the whole server
 export type RevisionMsg = Readonly<Topic<'revisions'>>;
 
 type Obj = Record<string, unknown>;
@@ -288,6 +288,7 @@ export function alarm(v: unknown): AlarmMsg | null {
         since_us: count(o.since_us),
         text: str(o.text),
         acknowledged: o.acknowledged === true,
+        mission: str(o.mission) || null,
       }
     : null;
 }

@@ -14,6 +14,8 @@ export interface LiveSink {
   /// After an interruption all topics are up to date again: by replay of so many messages of each, or by snapshots.
   resumed(recovered: ReadonlyMap<TopicName, number>, resynchronised: boolean): void;
   link(state: LinkState): void;
+  /// Name and version of the server, each time it greets.
+  server(name: string): void;
   /// A conversation ended before it began, or the server refused it: the session may have run out.
   refused(): void;
 }

@@ -48,6 +48,10 @@ export const jobs_version = signal(0); ///< grows with every news of a job; what
 export const toast = signal<{ text: string; id: number } | null>(null);
 export const synced = signal(false); ///< first snapshots are in: before that, empty means "not loaded yet"
 
+/// The server of another version than the one that this page came from: what the page has not loaded yet is not there any more.
+export const newer_server = signal(false);
+let first_server: string | null = null;
+
 export const now_ms = (): number => performance.now();
 let source: LiveSource | null = null;
 export const live_source = (): LiveSource | null => source;
@@ -257,6 +261,10 @@ export function connect(live: LiveSource, refused: () => void, fresh: () => void
       if (state === 'lost') lost_ms ??= now_ms() - live.data_age_ms();
       link.value = state;
       touch();
+    },
+    server: (name) => {
+      first_server ??= name;
+      newer_server.value = name !== first_server;
     },
     refused,
   };

@@ -143,25 +143,37 @@ export class Conditions {
 
 const when_last_seen = (a: Alarm): Alarm => ({ ...a, title: `${a.title}, when last seen`, acknowledged: true });
 
-/// Server's list and the page's own, once per id; the server's word wins where both speak. With the link lost its words are those it had last.
+/// Which flight is on the screen, and what the others are called.
+export interface Screen {
+  readonly mission: string | null;
+  readonly name: (mission: string) => string;
+}
+const capital = (text: string): string => text.slice(0, 1).toUpperCase() + text.slice(1);
+
+/// Server's list and the page's own, once per id and flight; the server's word wins where both speak. Of a flight that is not on the screen an alarm has
+/// its name before it, and never stands for the same one of the flight that is. With the link lost the words are those that were heard last.
 export function merged(
   own: readonly Alarm[],
   server: readonly AlarmMsg[],
   server_now_us: number,
   now_ms: number,
-  lost = false,
+  lost: boolean,
+  screen: Screen,
 ): Alarm[] {
   const named = new Map(own.map((a) => [a.id, a]));
   for (const a of server) {
+    const elsewhere = a.mission !== null && a.mission !== screen.mission ? a.mission : null,
+      id = elsewhere ? `${a.id} of ${elsewhere}` : a.id,
+      text = capital(a.text || a.id);
     const known: Alarm = {
-      id: a.id,
+      id,
       priority: a.priority,
-      title: a.text || a.id,
-      advice: named.get(a.id)?.advice ?? '',
+      title: elsewhere ? `Flight ${screen.name(elsewhere)}: ${text}` : text,
+      advice: named.get(id)?.advice ?? '',
       since_ms: now_ms - Math.max(0, server_now_us - a.since_us) / 1000,
       acknowledged: a.acknowledged,
     };
-    named.set(a.id, lost ? when_last_seen(known) : known);
+    named.set(id, lost ? when_last_seen(known) : known);
   }
   return [...named.values()].sort(by_rank);
 }

@@ -5,6 +5,7 @@ import {
   events,
   link,
   live_source,
+  mission_list,
   now_ms,
   server_alarms,
   server_now_us,
@@ -34,7 +35,11 @@ export const alarms = computed<readonly Alarm[]>(() => {
     range_silence_ms: scene ? now - scene.range_at_ms : Infinity,
     refused: newest_refusal(events.value, mission?.mission ?? null, server_now_us()),
   });
-  return merged(own, server_alarms.value, server_now_us(), now, link.value === 'lost').map((a) =>
+  const screen = {
+    mission: mission?.mission ?? null,
+    name: (id: string): string => mission_list.value.find((m) => m.mission === id)?.name || id.slice(0, 8),
+  };
+  return merged(own, server_alarms.value, server_now_us(), now, link.value === 'lost', screen).map((a) =>
     acknowledged.value.has(a.id) ? { ...a, acknowledged: true } : a,
   );
 });

@@ -1,8 +1,9 @@
 import { signal } from '@preact/signals';
 import type { ComponentType } from 'preact';
-import { useEffect } from 'preact/hooks';
+import { useEffect, useState } from 'preact/hooks';
 import { of_every_site } from '../state/session';
-import { link, toast } from '../state/store';
+import { current_scene, link, newer_server, tick, toast } from '../state/store';
+import { flying } from '../views/flight/words';
 import { load_compare, load_publish } from '../views/dialog_chunks';
 import { Live } from '../views/live';
 import { address_of } from './address';
@@ -63,7 +64,18 @@ function Later<P extends object>({ load, props }: { load: () => Promise<Componen
     return (
       <div class="empty">
         <h1 class="sr">Not loaded</h1>
-        <p role="status">This view could not be loaded from anchord. It opens as soon as the link is back.</p>
+        <p role="status">
+          {newer_server.value
+            ? 'This page is of an older version than its server, which does not have this view of it any more. Reload the page to open it.'
+            : link.value === 'live'
+              ? 'This view could not be loaded from anchord, though the link is there. If the server was upgraded, reload the page.'
+              : 'This view could not be loaded from anchord. It opens as soon as the link is back.'}
+        </p>
+        {link.value === 'live' && (
+          <button class="btn primary" onClick={() => location.reload()}>
+            Reload
+          </button>
+        )}
         <button class="btn" onClick={again}>
           Try again
         </button>
@@ -124,6 +136,24 @@ function usePrefetch(): void {
   }, [ready]);
 }
 const PREFETCH_AFTER_MS = 4000; // the first view has its data and its map by then
+/// After an upgrade of the server. In the air it waits: nothing may tempt anybody to reload then.
+function NewVersion() {
+  tick.value;
+  const [later, set_later] = useState(false),
+    p = current_scene()?.procedure?.value;
+  if (!newer_server.value || later || (p && flying(p))) return null;
+  return (
+    <div class="toast" data-testid="new-version">
+      <Mark shape="info" />A new version is ready.
+      <button class="btn small" onClick={() => location.reload()}>
+        Reload
+      </button>
+      <button class="btn small" onClick={() => set_later(true)}>
+        Later
+      </button>
+    </div>
+  );
+}
 /// Views whose values come from the server as they are now; a recording and a draft on this device do not age.
 const AGES: ReadonlySet<View> = new Set(['live', 'anchors', 'measurements', 'models', 'system']);
 
@@ -142,6 +172,7 @@ export function App() {
       <Rail view={view} />
       <main class={lost ? 'main lost' : 'main'} id="main" tabIndex={-1}>
         <div class="toasts" role="status">
+          <NewVersion />
           {toast.value && (
             <div class="toast" key={toast.value.id} data-testid="toast">
               <Mark shape="ok" />

@@ -93,7 +93,9 @@ function read(): Readings {
             ? look('caution')
             : look('ok');
   const rows = scene ? [...scene.ranges.values()] : [],
-    in_range = rows.filter((x) => now - x.at_ms < 2000).length;
+    // With the link lost: of those that were in range when the last one was heard.
+    in_range_at_ms = lost ? (scene?.range_at_ms ?? now) : now,
+    in_range = rows.filter((x) => in_range_at_ms - x.at_ms < 2000).length;
   const all_seen = Math.max(rows.length, mission?.anchors_found ?? 0, scene?.anchors.size ?? 0),
     uwb_stale = all_seen > 0 && (lost || !running);
   const pose = scene?.pose ?? null,
@@ -178,7 +180,7 @@ function read(): Readings {
     uwb: {
       ...(rows.length === 0 || uwb_stale ? look('off') : in_range === 0 ? look('bad') : look('ok')),
       stale: uwb_stale,
-      word: !all_seen ? 'none' : `${uwb_stale ? all_seen : in_range}/${all_seen}`,
+      word: !all_seen ? 'none' : `${running ? in_range : all_seen}/${all_seen}`,
       extra: uwb_stale ? (rows.length ? aged(now - (scene?.range_at_ms ?? 0)) : 'ended') : '',
       card: (
         <p>

@@ -135,12 +135,12 @@ export function FlightBar() {
                 class="cmd primary"
                 data-testid="cmd-hold"
                 disabled={lost || other !== null}
-                title={other ? dead : undefined}
+                title={lost || other ? dead : undefined}
                 onClick={act('hold')}
               >
                 <span>
                   <b>Hold</b>
-                  <small role="status">{note('hold')}</small>
+                  <small role="status">{note('hold') || (other ? 'no control' : '')}</small>
                 </span>
               </button>
             )}

@@ -14,9 +14,25 @@ import {
 } from '../../api/flight';
 import { events, link, now_ms, say, scenes, server_now_us, tick } from '../../state/store';
 import { answer_of, asked_at_us, loss_of, type Held } from './control';
+import { put_lease, take_lease } from './kept_lease';
 
-/// Ours, with the mission it is for. Lives as long as the page: two browsers of one person are two.
-export const lease = signal<Held | null>(null);
+/// The tab's own storage; null where the browser keeps nothing.
+function of_tab(): Storage | null {
+  try {
+    return globalThis.sessionStorage ?? null;
+  } catch {
+    return null;
+  }
+}
+const tab = of_tab();
+/// Ours, with the mission it is for. It lives as long as the tab, over a reload as well: two browsers of one person are two.
+export const lease = signal<Held | null>(tab && take_lease(tab));
+if (tab) {
+  globalThis.addEventListener('pagehide', () => put_lease(tab, lease.peek()));
+  globalThis.addEventListener('pageshow', (e) => {
+    if (e.persisted) take_lease(tab); // the page had gone on living, with its own
+  });
+}
 /// Why a control is not ours any more; stands until it is taken again or somebody waves it away.
 export const lost_control = signal<{ readonly mission: string; readonly text: string } | null>(null);
 export const asking = signal<{ readonly mission: string; readonly at_us: number } | null>(null);
@@ -78,7 +94,7 @@ export const order = (mission: string, anchor: string, action: AnchorOrder): Pro
     say(`${anchor} ${ORDER_WORDS[action]}`);
   });
 
-let renewed_ms = 0,
+let renewed_ms = -Infinity, // a lease of before a reload is asked for at once
   asking_now = false;
 async function renew(held: Held): Promise<void> {
   renewed_ms = now_ms();

@@ -5,7 +5,7 @@ import '../desk.css';
 import type { GridMsg, ProcedureMsg, ProfileMsg, Step } from '../../live/flight_messages';
 import { done_count } from '../../state/done';
 import { now_ms, replayed, tick, watched_lost, watched_mission, watched_scene } from '../../state/store';
-import { bearing, fixed } from '../../ui/format';
+import { bearing, clock, fixed } from '../../ui/format';
 import { Chip, Mark, Q } from '../../ui/marks';
 import { Axes, Drawing, line, scale, ticks, room } from '../chart';
 import { AfterLanding } from './after_landing';
@@ -41,7 +41,7 @@ export function Procedure() {
     [shape, tone, word] = missed ? (['caution', 'caution', STATUS_LOOK[p.status][2]] as const) : STATUS_LOOK[p.status],
     next = next_step(p.step);
   const since =
-    p.in_step_s === null ? null : p.in_step_s + (flying(p) && !stale ? (now_ms() - latest.at_ms) / 1000 : 0);
+    p.in_step_s === null || !flying(p) ? null : p.in_step_s + (stale ? 0 : (now_ms() - latest.at_ms) / 1000);
   return (
     <section class="sec-p" data-testid="procedure">
       <div class="hd">
@@ -136,7 +136,7 @@ export const Stage = ({
         {part}
       </span>
       <span class={`t cur ${stale ? 'stale' : ''}`}>
-        {in_step_s === null ? '' : <Q v={fixed(in_step_s, 0)} u="s" />}
+        {in_step_s === null ? '' : in_step_s < 90 ? <Q v={fixed(in_step_s, 0)} u="s" /> : clock(in_step_s, true)}
       </span>
       {children}
     </div>
