@@ -23,6 +23,13 @@ export async function delete_flight(id: string, admin: boolean): Promise<void> {
     throw e;
   }
 }
+/// Ends its recording; in the air only whoever has control of it may.
+export const finish_flight = (id: string, lease: string | null): Promise<unknown> =>
+  call('post', '/missions/{id}/actions', {
+    ...at(id),
+    body: { action: 'finish', ...(lease === null ? {} : { lease }) },
+    headers: { 'Idempotency-Key': idempotency_key() },
+  });
 export type Correction = Wire<'MissionCorrection'>;
 /// Of what was declared when it began. What the body leaves out stays, whoever corrected it meanwhile.
 export async function correct_flight(id: string, body: Correction): Promise<void> {

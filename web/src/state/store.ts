@@ -157,7 +157,7 @@ const handlers: Record<(typeof TOPICS)[number], Handler> & Partial<Record<TopicN
     for (const p of m.all(data, m.pose)) scene_of(p.mission).add_pose(p, measured_ms(p, 'position', whole), now_ms());
   },
   'rtk.status': (data, whole) => {
-    for (const r of m.all(data, m.rtk)) scene_of(r.mission).add_rtk(r, measured_ms(r, 'position', whole, false));
+    for (const r of m.all(data, m.rtk)) scene_of(r.mission).add_rtk(r, measured_ms(r, 'position', whole));
   },
   ranges: (data, whole) => {
     for (const r of m.all(data, m.range)) scene_of(r.mission).add_range(r, measured_ms(r, 'range', whole));

@@ -39,7 +39,8 @@ interface Props {
 }
 
 export function place_of(text: string): Corner | null {
-  const parts = text
+  // With decimal commas, "51,0232, 3,7133": what parts the two is then a comma with a space, a semicolon or a space alone.
+  const parts = (/\d,\d+\s*[;,\s]\s*-?\d+,\d/.test(text) ? text.replace(/(\d),(?=\d)/g, '$1.') : text)
     .trim()
     .split(/[,;\s]+/)
     .map(Number);
@@ -264,8 +265,8 @@ function Placed({
   return (
     <>
       <p class="why">
-        Click three or more corners on the plan, far apart, and give the place of each. A fourth, or the measured length
-        between the first two, shows which one is wrong.
+        Tap or click three or more corners on the plan, far apart, and give the place of each. A fourth, or the measured
+        length between the first two, shows which one is wrong.
       </p>
       <div class="clickplan">
         <img
@@ -313,9 +314,13 @@ function Placed({
                       aria-label={`Place of point ${i + 1}`}
                       placeholder="51.0232, 3.7133"
                       value={r.place}
+                      aria-invalid={r.place.trim() !== '' && place_of(r.place) === null}
                       data-testid={`place-${i + 1}`}
                       onInput={(e) => change(i, e.currentTarget.value)}
                     />
+                    {r.place.trim() !== '' && place_of(r.place) === null && (
+                      <span class="bad"> is not a latitude and a longitude in degrees</span>
+                    )}
                   </td>
                   <td data-testid={`residual-${i + 1}`}>
                     {off ? `${fixed(Math.hypot(off[0]!, off[1]!), 2)} m` : ''}

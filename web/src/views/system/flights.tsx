@@ -5,6 +5,7 @@ import { error_text } from '../../api/client';
 import {
   delete_flight,
   deleted_flights,
+  finish_flight,
   handover_url,
   restore_flight,
   stored_flights,
@@ -12,11 +13,12 @@ import {
 } from '../../api/missions';
 import { may } from '../../state/session';
 import { load_missions } from '../../state/archive';
-import { events, say, when_back } from '../../state/store';
+import { events, link, say, when_back } from '../../state/store';
 import { Empty } from '../../ui/empty';
 import { date, grouped } from '../../ui/format';
 import { Problem } from '../../ui/problem';
 import { useStable } from '../../ui/use_stable';
+import { lease } from '../flight/lease';
 import { FlightForm } from './flight_form';
 
 const days = (seconds: number): string =>
@@ -55,6 +57,15 @@ export function FlightsPanel() {
   const remove = (f: StoredFlight): void => {
     if (sure !== f.id) set_sure(f.id);
     else void guarded(() => delete_flight(f.id, may()), `${f.name} is in the bin`);
+  };
+  const finish = (f: StoredFlight): void => {
+    const held = lease.peek();
+    if (sure !== f.id) set_sure(f.id);
+    else
+      void guarded(
+        () => finish_flight(f.id, held?.mission === f.id ? held.key : null),
+        `${f.name || 'The flight'} is finished`,
+      );
   };
   const restore = (f: StoredFlight): void =>
     void guarded(async () => {
@@ -128,7 +139,15 @@ export function FlightsPanel() {
                 {operator && (
                   <td class="acts">
                     {f.state === 'recording' ? (
-                      <span class="mut">finish it first</span>
+                      <button
+                        class="btn small"
+                        data-testid="finish-flight"
+                        disabled={link.value === 'lost'}
+                        aria-label={`${sure === f.id ? 'Press again to finish' : 'Finish'} ${f.name || f.id.slice(0, 8)}`}
+                        onClick={() => finish(f)}
+                      >
+                        {sure === f.id ? 'Press again to finish' : 'Finish'}
+                      </button>
                     ) : (
                       <>
                         <button
