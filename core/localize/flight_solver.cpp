@@ -12,6 +12,7 @@
 #include "core/localize/flight_verdict.hpp"
 #include "core/localize/joint_rounds.hpp"
 #include "core/localize/kit_prior.hpp"
+#include "core/localize/own_delay.hpp"
 #include "core/localize/region_reason.hpp"
 #include "core/localize/scatter_doubt.hpp"
 #include "core/localize/sector_doubt.hpp"
@@ -329,6 +330,8 @@ void add_delay_doubts(Work& work) {
        "their ranges fit better if those from one side are too long: an obstacle there may lengthen them");
   note(add_direction_doubt(work.rows, work.options, work.fit),
        "the errors of their ranges depend on the direction: walls and a roof may lengthen them");
+  note(add_own_delay_doubt(work.rows, work.options, work.fit),
+       "their ranges want a delay of their own: antenna delay, cable, firmware or a wall before one anchor");
 }
 
 /// What is asked of a flight as a whole, after all of them are solved.

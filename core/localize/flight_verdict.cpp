@@ -2,9 +2,11 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdio>
 #include <numbers>
+#include <span>
 
 #include "core/localize/error_ellipse.hpp"
 #include "core/localize/gates.hpp"
@@ -308,6 +310,14 @@ AnchorSolution verdict_of(const FlightRows& flight, const JointFit& fit, std::si
   return solution;
 }
 
+/// What only somebody at the site can set right stands in the reason too, not in its gate alone.
+void name_failed(std::span<const char* const> names, Estimate& estimate) {
+  for (const Gate& gate : estimate.gates) {
+    if (gate.passed || std::ranges::find(names, gate.name) == names.end()) continue;
+    estimate.reason += (estimate.reason.empty() ? "" : "; ") + gate.why;
+  }
+}
+
 }  // namespace
 
 AnchorSolution assess_anchor(const FlightRows& flight, const JointFit& fit, std::size_t index,
@@ -315,6 +325,8 @@ AnchorSolution assess_anchor(const FlightRows& flight, const JointFit& fit, std:
   AnchorSolution solution = verdict_of(flight, fit, index, options);
   if (fit.state.anchors[index].active) solution.residuals = residuals_of(flight, fit, index, options);
   solution.estimate.gates = gates_of(flight, fit, index, solution, options);
+  constexpr std::array k_for_people{"second_place", "own_delay"};
+  name_failed(k_for_people, solution.estimate);
   return solution;
 }
 

@@ -8,7 +8,9 @@
 #include "core/localize/error_model_likelihood.hpp"
 #include "core/localize/geometry.hpp"
 #include "core/localize/joint_lines.hpp"
+#include "core/localize/own_delay.hpp"
 #include "core/localize/residual.hpp"
+#include "core/localize/second_place.hpp"
 #include "core/localize/solver.hpp"
 
 namespace anchord {
@@ -92,16 +94,12 @@ Lateness lateness_of(const JointFit& fit, std::size_t index, const FlightOptions
   const auto middle = others_m.begin() + static_cast<std::ptrdiff_t>((others_m.size() - 1) / 2);
   std::ranges::nth_element(others_m, middle);
   out.scale_ratio = block.scale_m / *middle;
-  const double prior = 1.0 / (options.delay_prior_m * options.delay_prior_m);
-  Eigen::Matrix3d place = block.own.topLeftCorner<3, 3>();
-  place.diagonal().array() += 1e-6 * place.diagonal().maxCoeff() + 1e-12;
-  const Eigen::Vector3d with = block.own.topRightCorner<3, 1>();
-  const double told = block.own(3, 3) - prior - with.dot(place.ldlt().solve(with));
-  if (!(told > 1e-6)) return out;
-  // At the solution the ranges hold against the prior's pull, prior * delay.
-  out.delay_m = fit.state.anchors[index].delay_m * (1.0 + prior / told);
+  const auto own = own_delay(fit, index, options);
+  if (!own) return out;
+  out.delay_m = own->delay_m;
   const double bias_m2 = std::max(fit.shared_covariance(k_shared_bias, k_shared_bias), 0.0);
-  out.delay_z = out.delay_m / std::sqrt(1.0 / told + 1.0 / prior + bias_m2);
+  out.delay_z = out.delay_m / std::sqrt(own->sigma_m * own->sigma_m +
+                                        options.delay_prior_m * options.delay_prior_m + bias_m2);
   return out;
 }
 
@@ -222,15 +220,15 @@ std::vector<Gate> gates_of(const FlightRows& flight, const JointFit& fit, std::s
                      outside_m, options.outline_sigma_m)));
   }
   // What a model has judged is corrected and weighed as what it is: late ranges are no surprise there.
-  const auto& rows = flight.anchors[index].rows;
-  const auto n_judged =
-      std::ranges::count_if(rows, [](const JointRow& row) { return row.error_model != nullptr; });
-  if (2 * static_cast<std::size_t>(n_judged) < rows.size())
+  if (!mostly_modelled(flight.anchors[index])) {
     gates.push_back(blocked(fit, index, options, limits));
+    if (auto own = own_delay_gate(flight, fit, index, options)) gates.push_back(std::move(*own));
+  }
   gates.push_back(at_most("residual_scale", solution.residual_scale_m, limits.residual_scale_m,
                           "1.4826 x median absolute residual, metres"));
   gates.push_back(chi_square(solution, options, limits));
   gates.push_back(halves(flight, fit, index, options, limits));
+  gates.push_back(second_place_gate(flight, fit, index, options));
   const double bias_sigma_m = std::sqrt(std::max(fit.shared_covariance(k_shared_bias, k_shared_bias), 0.0));
   gates.push_back(at_most(
       "bias", bias_sigma_m, 2.0 * options.bias_known_sigma_m,

@@ -27,7 +27,8 @@ struct GateLimits {
 };
 
 /// Every gate one flight can ask of one anchor, in a fixed order: redundancy, rejected, geometry, precision,
-/// side, outline (where there is one), blocked, residual_scale, chi_square, halves, bias, settled.
+/// side, outline (where there is one), blocked, own_delay (not in rooms), residual_scale, chi_square, halves,
+/// second_place, bias, settled.
 ///
 /// chi_square  means of the residuals over two correlation times, each against the residual scale: white
 ///             noise averages out there, an error of the model does not

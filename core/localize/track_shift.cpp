@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "core/base/median.hpp"
+#include "core/localize/clock_text.hpp"
 #include "core/localize/gates.hpp"
 #include "core/localize/weighed_row.hpp"
 #include "core/localize/widen.hpp"
@@ -209,12 +210,12 @@ AnchorParts ShiftTest::parts_of(std::size_t index) const {
   JointState::Anchor seen_from_shifted = anchor;
   seen_from_shifted.position_m -= trial_.shift_m;
   const AnchorBlock& block = fit.normal.anchors[index];
-  struct Line {
+  struct ShiftLine {
     const JointRow* row;
     JointLine at;
     std::size_t part;
   };
-  std::vector<Line> lines;
+  std::vector<ShiftLine> lines;
   std::vector<double> sizes_m;
   for (const JointRow& row : flight.anchors[index].rows) {
     const double at_s = row.t_s + trial_.state.shared[k_shared_lag];
@@ -231,7 +232,7 @@ AnchorParts ShiftTest::parts_of(std::size_t index) const {
   out.parts.assign(breaks.size() + 1, ShiftSums::Zero());
   out.scale_m =
       sizes_m.empty() ? block.scale_m : std::max(1.4826 * upper_median(sizes_m), options.min_scale_m);
-  for (const Line& line : lines) {
+  for (const ShiftLine& line : lines) {
     const WeighedRow by = weighed(*line.row, line.at, block, trial_.scales_m[index], trial_.wide, options);
     Eigen::Matrix<double, k_columns, 1> columns;
     columns << line.at.by_anchor, line.at.by_shared, by.residual_m;
@@ -396,11 +397,6 @@ Eigen::Matrix3d off_m2(const Answer& answer, std::size_t anchor) {
                          answer.right * other * square * other.transpose());
 }
 
-std::string at_time(const FlightRows& flight, double t_s) {
-  // Whole seconds: a person looks for it in a plot.
-  return to_rfc3339(UtcTime{flight.epoch.ns + std::llround(t_s) * 1'000'000'000LL}).substr(11, 8);
-}
-
 std::string after_what(const TrackBreak& where) {
   char text[120];
   const double s = where.to_s - where.from_s;
@@ -424,9 +420,9 @@ std::string mostly(const Eigen::Vector3d& shift_m) {
 
 std::string since(const FlightRows& flight, std::span<const TrackBreak> breaks, const Shifted& parts) {
   const TrackBreak& where = breaks[parts.first - 1];
-  std::string text = "from " + at_time(flight, where.to_s);
+  std::string text = "from " + clock_text(flight, where.to_s);
   if (parts.last <= breaks.size())
-    return text + " to " + at_time(flight, breaks[parts.last - 1].from_s) + " UTC";
+    return text + " to " + clock_text(flight, breaks[parts.last - 1].from_s) + " UTC";
   return text + " UTC on, " + after_what(where);
 }
 

@@ -199,6 +199,22 @@ TEST(LiveMission, NoAnchorConvergesThatAGateHoldsBack) {
   EXPECT_EQ(n_converged(events), 3U);
 }
 
+/// Too few of the ranges are from its new place for the solution to leave the old one, which stays accurate.
+TEST(LiveMission, AnAnchorThatMovedAfterMostOfTheFlightIsHeldBack) {
+  const MadeFlight made = turning();
+  MadeFlight moved = made;
+  moved.anchors[0] += Eigen::Vector3d(2, -1.5, 0);
+  auto data = make_flight(made);
+  const auto other = make_flight(moved);
+  for (std::size_t i = 0; i < data.ranges.size(); ++i) {
+    if (data.ranges[i].time.seconds() > 70)
+      data.ranges[i] = other.ranges[i];  // 20 s of the last solution's 90
+  }
+  const auto events = fly(data);
+  EXPECT_EQ(n_held_back(events, "second_place"), 1U);
+  EXPECT_EQ(n_converged(events), 3U);
+}
+
 /// The gates are those of the whole flight: before they were asked nothing is called done.
 TEST(LiveMission, NoAnchorConvergesBeforeAJointSolution) {
   const auto data = make_flight(turning());

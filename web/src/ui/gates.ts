@@ -40,6 +40,11 @@ const WORDS: Record<string, Words> = {
     fails: 'Residuals are larger than those of the other anchors',
     unit: '×',
   },
+  own_delay: {
+    passes: 'No delay of its ranges alone is seen',
+    fails: 'Its ranges are too long or too short, unlike those of the other anchors',
+    unit: 'm',
+  },
   residual_scale: { passes: 'Residuals are small', fails: 'Residuals are too large', unit: 'm' },
   chi_square: {
     passes: 'Residuals average out over time',
@@ -47,6 +52,11 @@ const WORDS: Record<string, Words> = {
     unit: 'χ²',
   },
   halves: { passes: 'The two halves of the flight agree', fails: 'The two halves of the flight disagree', unit: 'χ²' },
+  second_place: {
+    passes: 'No other position agrees with many of its ranges',
+    fails: 'A part of its ranges agrees on another position',
+    unit: '%',
+  },
   flights: { passes: 'The flights agree', fails: 'The flights disagree', unit: 'χ²' },
   moved: { passes: 'Same position as before', fails: 'It has moved, or one of the positions is wrong', unit: 'χ²' },
   bias: { passes: 'Range bias of the kit is known, σ', fails: 'Range bias of the kit is not known, σ', unit: 'm' },

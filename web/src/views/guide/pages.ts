@@ -514,6 +514,16 @@ export const PAGES: readonly Page[] = [
             'Look at the track around that time; fly again',
           ],
           [
+            'A part of its ranges agrees on another position',
+            'it was moved, its address was exchanged, or a reflection was received in place of the direct signal',
+            'Read since when in its detail; set addresses right; fly it again, with a free line of sight',
+          ],
+          [
+            'Its ranges are too long or too short, unlike those of the other anchors',
+            'another antenna delay, cable or firmware, or a wall close to it',
+            'Set its antenna delay as on the others; move it away from the wall; fly again',
+          ],
+          [
             'A part of the track is shifted',
             'RTK fixed wrongly after a gap, or the base position changed',
             'Exclude the positions before or after the gap, whichever is wrong; else fly again',
