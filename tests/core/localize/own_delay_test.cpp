@@ -9,7 +9,7 @@
 #include "core/localize/flight_solver.hpp"
 #include "tests/core/localize/flight_support.hpp"
 
-namespace anchord {
+namespace anchord::own_delay_test {
 namespace {
 
 using testing::MadeFlight;
@@ -63,4 +63,4 @@ TEST(OwnDelay, IsNoneWhereAllAnchorsShareIt) {
 }
 
 }  // namespace
-}  // namespace anchord
+}  // namespace anchord::own_delay_test
