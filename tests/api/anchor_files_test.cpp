@@ -74,7 +74,6 @@ TEST_F(AnchorFiles, DxfWritesPercentSignsAndCaretsThatNoProgramReadsAsACode) {
 
 // XML 1.0, section 2.2: Char has neither of the last two code points of the plane, nor control characters.
 TEST(HtmlText, KeepsOutWhatXmlForbids) {
-  using api::html_text;
   EXPECT_EQ(html_text("a\xEF\xBF\xBE|\xEF\xBF\xBF|\x01z"), "a\xEF\xBF\xBD|\xEF\xBF\xBD|z");
   EXPECT_EQ(html_text("\xEF\xBF\xBD\xEF\xBC\xA1<"), "\xEF\xBF\xBD\xEF\xBC\xA1&lt;");
 }
