@@ -65,11 +65,13 @@ function Later<P extends object>({ load, props }: { load: () => Promise<Componen
       <div class="empty">
         <h1 class="sr">Not loaded</h1>
         <p role="status">
-          {newer_server.value
-            ? 'This page is of an older version than its server, which does not have this view of it any more. Reload the page to open it.'
-            : link.value === 'live'
-              ? 'This view could not be loaded from anchord, though the link is there. If the server was upgraded, reload the page.'
-              : 'This view could not be loaded from anchord. It opens as soon as the link is back.'}
+          {`This view could not be loaded from anchord. ${
+            newer_server.value
+              ? 'The server is of another version than this page: reload it.'
+              : link.value === 'live'
+                ? 'If the server was upgraded, reload this page.'
+                : 'It opens as soon as the link is back.'
+          }`}
         </p>
         {link.value === 'live' && (
           <button class="btn primary" onClick={() => location.reload()}>

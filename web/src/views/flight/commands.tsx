@@ -7,7 +7,7 @@ import { current_mission, current_scene, events, link, live_source, say, server_
 import { clock, fixed, percent } from '../../ui/format';
 import { useLater } from '../../ui/use_later';
 import { checklist_open } from './checklist_open';
-import { DevicesNote } from './devices_note';
+import { Aside, load_devices_note } from './aside';
 import { command_note, question_of, why_no_command } from './control';
 import { HoldButton } from './hold_button';
 import { PlanNotice } from './plan_notice';
@@ -50,7 +50,7 @@ export function FlightBar() {
   return (
     <div class="fbar" data-testid="flight-bar">
       {p && <Progress p={p} />}
-      <DevicesNote mission={mission.mission} />
+      <Aside load={load_devices_note} mission={mission.mission} />
       {p && <PlanNotice p={p} />}
       <div class="cmds" data-testid="commands">
         {!checklist_open.value && (problem.value || refused_start) && (

@@ -8,8 +8,7 @@ import { now_ms, replayed, tick, watched_lost, watched_mission, watched_scene } 
 import { bearing, clock, fixed } from '../../ui/format';
 import { Chip, Mark, Q } from '../../ui/marks';
 import { Axes, Drawing, line, scale, ticks, room } from '../chart';
-import { AfterLanding } from './after_landing';
-import { FlightTime } from './flight_time';
+import { Aside, load_after_landing, load_flight_time } from './aside';
 import {
   flying,
   grid_measure,
@@ -87,8 +86,8 @@ export function Procedure() {
       )}
       {(p.status === 'done' || p.status === 'aborted') && (
         <>
-          <FlightTime mission={p.mission} />
-          {!stored && <AfterLanding mission={p.mission} />}
+          <Aside load={load_flight_time} mission={p.mission} />
+          {!stored && <Aside load={load_after_landing} mission={p.mission} />}
         </>
       )}
       {p.ended && flying(p) && p.ended !== p.reason && <p class="why says">Why it returns: {p.ended}.</p>}
