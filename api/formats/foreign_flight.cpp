@@ -308,9 +308,14 @@ class TrackReader {
                ? "x, y, z are more than 100 km from zero: a coordinate system is needed"
                : "";
   }
+  /// Receivers and recorders write 0 for one they do not know.
+  static std::optional<double> known_sigma(const Cells::At& cells, std::size_t row) {
+    const auto value = cells.number(row);
+    return value && *value == 0 ? std::nullopt : value;
+  }
   std::string wrong_sigma(std::size_t row) const {
     for (const auto* sigma : {&sigma_h_, &sigma_v_, &sigma_e_, &sigma_n_})
-      if (const auto value = sigma->number(row); value && !row_limits::k_sigma_m.hold(*value))
+      if (const auto value = known_sigma(*sigma, row); value && !row_limits::k_sigma_m.hold(*value))
         return "the standard deviation is not 0.00001 to 1000 m";
     return "";
   }
@@ -321,8 +326,8 @@ class TrackReader {
     return FixClass::none;
   }
   void add_uncertainty(std::size_t row, Fix& fix) const {
-    const auto both = sigma_h_.number(row), up = sigma_v_.number(row);
-    auto east = sigma_e_.number(row), north = sigma_n_.number(row);
+    const auto both = known_sigma(sigma_h_, row), up = known_sigma(sigma_v_, row);
+    auto east = known_sigma(sigma_e_, row), north = known_sigma(sigma_n_, row);
     if (!east) east = both;
     if (!north) north = both;
     if (up && east && north) fix.covariance_m2 = row_limits::covariance_of_sigmas({*east, *north, *up});

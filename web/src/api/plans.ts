@@ -216,7 +216,7 @@ export async function import_file(name: string, text: string): Promise<{ plan: P
       },
     }),
     answer = obj(body),
-    looked_at = answer && 'notes' in answer ? answer : null; // what is not stored comes with notes
+    looked_at = answer && 'plan' in answer ? answer : null; // one that is stored is the plan itself
   return { plan: plan_of(looked_at?.plan), notes: texts(looked_at?.notes) };
 }
 export const export_url = (id: string, format: 'plan' | 'geojson'): string =>

@@ -330,7 +330,12 @@ function fixes_of(
         : '';
     },
     fix = text('fix'),
-    [h, v, e, n] = (['sigma_h', 'sigma_v', 'sigma_e', 'sigma_n'] as const).map(value),
+    /// Receivers and recorders write 0 for one they do not know.
+    known = (column: Field): ((row: readonly string[]) => number | null) => {
+      const read = value(column);
+      return (row) => read(row) || null;
+    },
+    [h, v, e, n] = (['sigma_h', 'sigma_v', 'sigma_e', 'sigma_n'] as const).map(known),
     wrong_sigma = (row: readonly string[]): string =>
       [h, v, e, n].some((sigma) => {
         const value = sigma!(row);
