@@ -10,7 +10,6 @@ import { checklist_open } from './checklist_open';
 import { Aside, load_devices_note } from './aside';
 import { command_note, question_of, why_no_command } from './control';
 import { HoldButton } from './hold_button';
-import { PlanNotice } from './plan_notice';
 import { ask, asking, give_back, lease, lost_control, problem, refuse, send, take } from './lease';
 import { flying } from './words';
 
@@ -51,7 +50,7 @@ export function FlightBar() {
     <div class="fbar" data-testid="flight-bar">
       {p && <Progress p={p} />}
       <Aside load={load_devices_note} mission={mission.mission} />
-      {p && <PlanNotice p={p} />}
+      {p && <Notice p={p} />}
       <div class="cmds" data-testid="commands">
         {!checklist_open.value && (problem.value || refused_start) && (
           <p class="problem" role="alert">
@@ -169,6 +168,12 @@ export function FlightBar() {
       {operator && idle && <BeforeTakeOff mission={mission.mission} note={refused_start} />}
     </div>
   );
+}
+
+const load_plan_notice = () => import('./plan_notice').then((m) => m.PlanNotice);
+function Notice({ p }: { p: ProcedureMsg }) {
+  const { part: PlanNotice } = useLater(load_plan_notice);
+  return PlanNotice && <PlanNotice p={p} />;
 }
 
 /// Fetched when there is a flight to start, before anybody asks for it.
