@@ -68,9 +68,7 @@ function Later<P extends object>({ load, props }: { load: () => Promise<Componen
           {`This view could not be loaded from anchord. ${
             newer_server.value
               ? 'The server is of another version than this page: reload it.'
-              : link.value === 'live'
-                ? 'If the server was upgraded, reload this page.'
-                : 'It opens as soon as the link is back.'
+              : `It opens as soon as the link is back.${link.value === 'live' ? ' If the server was upgraded, reload this page.' : ''}`
           }`}
         </p>
         {link.value === 'live' && (
