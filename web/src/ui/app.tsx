@@ -65,10 +65,8 @@ function Later<P extends object>({ load, props }: { load: () => Promise<Componen
       <div class="empty">
         <h1 class="sr">Not loaded</h1>
         <p role="status">
-          {`This view could not be loaded from anchord. ${
-            newer_server.value
-              ? 'The server is of another version than this page: reload it.'
-              : `It opens as soon as the link is back.${link.value === 'live' ? ' If the server was upgraded, reload this page.' : ''}`
+          {`This view could not be loaded from anchord. It opens as soon as the link is back.${
+            link.value === 'live' ? ' If the server was upgraded, reload this page.' : ''
           }`}
         </p>
         {link.value === 'live' && (
