@@ -14,7 +14,6 @@ export interface Arrival {
 const LATENCY_MS = 2000, // so late is a row on its way through receiver, server and link
   STEADY_MS = 2000,
   TIMELY_MS = 1000, // a link that is later than this says nothing of a clock
-  REPLAY_MS = 86_400_000, // what is later than a day was not held back on its way: it is replayed, perhaps faster than it was flown
   WOBBLE_MS = 500; // by so much the lag of a clock that is off may differ within STEADY_MS
 /// By how much a clock of a flight differs from the server's (positive: it is behind), by the rows that come live: the least lag. A row that is late by
 /// more than its way takes may be what a gateway held back, whose lag shrinks as it catches up: only a lag that stays is a clock that is behind.
@@ -50,7 +49,8 @@ export class Measured {
     let skew = this.skews.get(key);
     if (!skew) this.skews.set(key, (skew = new Skew()));
     if (teaches) skew.learn(a, lag_ms);
-    if (skew.ms === null && a.live && lag_ms > REPLAY_MS) return a.now_ms - a.data_age_ms;
+    // Nothing was timely yet: a recording that is replayed faster than it was flown, or a clock that is off. What comes as it is made counts from then.
+    if (skew.ms === null && a.live && a.data_age_ms <= TIMELY_MS) return a.now_ms;
     if (skew.ms === null && lag_ms < -LATENCY_MS) return -Infinity;
     return a.now_ms - Math.max(0, lag_ms - (skew.ms ?? 0));
   }
