@@ -1,6 +1,6 @@
 import { signal } from '@preact/signals';
 import type { ComponentType } from 'preact';
-import { useEffect, useState } from 'preact/hooks';
+import { useEffect } from 'preact/hooks';
 import { of_every_site } from '../state/session';
 import { current_scene, link, newer_server, tick, toast } from '../state/store';
 import { flying } from '../views/flight/words';
@@ -64,13 +64,9 @@ function Later<P extends object>({ load, props }: { load: () => Promise<Componen
     return (
       <div class="empty">
         <h1 class="sr">Not loaded</h1>
-        <p role="status">
-          {`This view could not be loaded from anchord. It opens as soon as the link is back.${
-            link.value === 'live' ? ' If the server was upgraded, reload this page.' : ''
-          }`}
-        </p>
+        <p role="status">This view could not be loaded from anchord. It opens as soon as the link is back.</p>
         {link.value === 'live' && (
-          <button class="btn primary" onClick={() => location.reload()}>
+          <button class="btn" onClick={reload}>
             Reload
           </button>
         )}
@@ -134,20 +130,18 @@ function usePrefetch(): void {
   }, [ready]);
 }
 const PREFETCH_AFTER_MS = 4000; // the first view has its data and its map by then
+const reload = (): void => location.reload();
+
 /// After an upgrade of the server. In the air it waits: nothing may tempt anybody to reload then.
 function NewVersion() {
   tick.value;
-  const [later, set_later] = useState(false),
-    p = current_scene()?.procedure?.value;
-  if (!newer_server.value || later || (p && flying(p))) return null;
+  const p = current_scene()?.procedure?.value;
+  if (!newer_server.value || (p && flying(p))) return null;
   return (
-    <div class="toast" data-testid="new-version">
-      <Mark shape="info" />A new version is ready.
-      <button class="btn small" onClick={() => location.reload()}>
+    <div class="toast">
+      A new version is ready.
+      <button class="btn small" onClick={reload}>
         Reload
-      </button>
-      <button class="btn small" onClick={() => set_later(true)}>
-        Later
       </button>
     </div>
   );
