@@ -38,7 +38,7 @@ Result<const Projection*> GeoService::projection(int epsg, const Site& site) {
   if (!geographic)
     return make_error(Errc::unsupported,
                       "the datum '" + to_utf8(datum, 40) + "' is not known to this server");
-  const auto& found = opened({epsg, *geographic, site.crs_epoch ? site.crs_epoch : stated_epoch_year(datum)});
+  const auto& found = opened({epsg, *geographic, stated_epoch_year(datum, site.crs_epoch)});
   if (!found) return found.error();
   return &found.value();
 }

@@ -127,7 +127,7 @@ void describe(Report& report, const std::vector<Mission>& missions, const std::s
   const bool plane = settings.is_object() && settings.value("dims", Json()) == 2;
   std::string loss = "tukey", weights = "inverse_variance";
   if (settings.is_object()) {
-    weights = settings.value("weights", weights);
+    if (settings.value("weights", Json()).is_string()) weights = settings["weights"].get<std::string>();
     if (settings.contains("loss") && settings["loss"].is_object())
       loss = settings["loss"].value("type", loss);
   }

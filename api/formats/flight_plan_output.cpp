@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 
+#include "api/formats/mission_item.hpp"
 #include "core/base/to_wire.hpp"
 #include "core/geo/enu.hpp"
 
@@ -92,8 +93,7 @@ std::string flight_plan_geojson(const planning::FlightPlan& plan, const Wgs84& o
 
 std::string flight_plan_qgc(const planning::FlightPlan& plan, const Wgs84& origin,
                             const planning::Polygon& outline, const planning::FlightPlanOptions& options) {
-  // MAV_CMD and MAV_FRAME numbers of the MAVLink common set.
-  constexpr int k_waypoint = 16, k_return = 20, k_takeoff = 22, k_relative_altitude = 3, k_mission_frame = 2;
+  using namespace mission_item;
   const EnuFrame frame(origin);
   Ordered items = Ordered::array();
   const auto put = [&](int command, int mav_frame, Ordered params, double altitude) {
@@ -114,16 +114,16 @@ std::string flight_plan_qgc(const planning::FlightPlan& plan, const Wgs84& origi
     const auto& first = plan.waypoints.front();
     const auto at = place_of(frame, first.point_m.head<2>());
     home = {at.lat_deg, at.lon_deg, 0};
-    put(k_takeoff, k_relative_altitude, {0, 0, 0, nullptr, at.lat_deg, at.lon_deg, first.point_m.z()},
+    put(k_takeoff, k_frame_relative, {0, 0, 0, nullptr, at.lat_deg, at.lon_deg, first.point_m.z()},
         first.point_m.z());
   }
   for (const auto& w : plan.waypoints) {
     const auto at = place_of(frame, w.point_m.head<2>());
-    put(k_waypoint, k_relative_altitude,
+    put(k_waypoint, k_frame_relative,
         {w.measure ? options.dwell_s : 0.0, 0, 0, heading_deg(w), at.lat_deg, at.lon_deg, w.point_m.z()},
         w.point_m.z());
   }
-  put(k_return, k_mission_frame, {0, 0, 0, 0, 0, 0, 0}, 0);
+  put(k_return, k_frame_mission, {0, 0, 0, 0, 0, 0, 0}, 0);
 
   Ordered corners = Ordered::array();
   for (const auto& corner : outline) {

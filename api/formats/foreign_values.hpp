@@ -31,8 +31,7 @@ inline constexpr auto k_length_unit_words =
 double per_metre(LengthUnit unit);
 
 /// What the numbers of a fix column mean; `words` where it has none. Who takes one for the other believes
-/// single positions as RTK fixed ones. `gnss`: words,
-/// and "FIX" alone is any fix of a receiver.
+/// single positions as RTK fixed ones. `gnss`: words, and "FIX" alone is any fix of a receiver.
 enum class FixNumbers : std::uint8_t { words, gnss, solution, nmea, rtklib, mavlink };
 inline constexpr auto k_fix_numbers_words = enum_table<FixNumbers>({{"words", FixNumbers::words},
                                                                     {"gnss", FixNumbers::gnss},

@@ -2,6 +2,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "api/formats/mission_item.hpp"
 #include "core/base/to_wire.hpp"
 #include "core/planning/local_plan.hpp"
 
@@ -10,9 +11,7 @@ namespace {
 
 using Ordered = nlohmann::ordered_json;
 
-// MAV_CMD and MAV_FRAME of the MAVLink common set.
-constexpr int k_waypoint = 16, k_return = 20, k_takeoff = 22, k_yaw = 115;
-constexpr int k_relative_altitude = 3, k_mission_frame = 2;
+using namespace mission_item;
 
 class Items {
  public:
@@ -59,19 +58,19 @@ Result<std::string> plan_qgc(const Plan& plan) {
   if (!plan.waypoints.empty()) {
     const auto& first = plan.waypoints.front();
     home = first.at;
-    items.put(k_takeoff, k_relative_altitude, {0, 0, 0, nullptr, home.lat_deg, home.lon_deg, first.height_m},
+    items.put(k_takeoff, k_frame_relative, {0, 0, 0, nullptr, home.lat_deg, home.lon_deg, first.height_m},
               first.height_m);
   }
   for (const auto& w : plan.waypoints) {
     const double hold_s = w.measure ? w.dwell_s.value_or(plan.settings.dwell_s) : 0;
-    items.put(k_waypoint, k_relative_altitude,
+    items.put(k_waypoint, k_frame_relative,
               {hold_s, 0, 0, w.heading_deg ? Ordered(*w.heading_deg) : Ordered(nullptr), w.at.lat_deg,
                w.at.lon_deg, w.height_m},
               w.height_m);
     // 360 degrees, 30 degrees a second, clockwise, relative to where the nose is.
-    if (w.turn) items.put(k_yaw, k_mission_frame, {360, 30, 1, 1, 0, 0, 0}, 0);
+    if (w.turn) items.put(k_yaw, k_frame_mission, {360, 30, 1, 1, 0, 0, 0}, 0);
   }
-  items.put(k_return, k_mission_frame, {0, 0, 0, 0, 0, 0, 0}, 0);
+  items.put(k_return, k_frame_mission, {0, 0, 0, 0, 0, 0, 0}, 0);
 
   Ordered polygons = Ordered::array();
   if (!plan.fence.empty()) polygons.push_back(qgc_polygon(plan.fence, true));

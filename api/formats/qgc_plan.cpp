@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 
+#include "api/formats/mission_item.hpp"
 #include "core/geo/enu.hpp"
 
 namespace anchord::api {
@@ -11,11 +12,8 @@ namespace {
 
 using Json = nlohmann::json;
 
-// MAV_CMD and MAV_FRAME of the MAVLink common set.
-constexpr int k_waypoint = 16, k_return = 20, k_land = 21, k_takeoff = 22, k_yaw = 115;
-constexpr int k_frame_msl = 0, k_frame_relative = 3, k_frame_mission = 2;
-// MAV_CMD_NAV_FENCE_RETURN_POINT to .._CIRCLE_EXCLUSION: a fence among the items of the mission.
-constexpr int k_fence_first = 5000, k_fence_last = 5004;
+using namespace mission_item;
+
 constexpr std::size_t k_max_items = 1000, k_max_areas = 100;
 
 void fail(std::vector<FieldError>& errors, std::string at, const char* code, std::string detail) {

@@ -164,7 +164,7 @@ void place(PlaceApi& s, Floor& floor, const Georeference& georeference, const st
 }
 
 SiteDatum datum_of(const Site& site) {
-  return {site.crs_frame, site.crs_epoch ? site.crs_epoch : stated_epoch_year(site.crs_frame)};
+  return {site.crs_frame, stated_epoch_year(site.crs_frame, site.crs_epoch)};
 }
 
 /// Where a site is in its map system; nothing where it has none, or lies outside of it.

@@ -131,7 +131,8 @@ std::optional<int> geographic_epsg(std::string_view datum) {
   return std::nullopt;
 }
 
-std::optional<double> stated_epoch_year(std::string_view datum) {
+std::optional<double> stated_epoch_year(std::string_view datum, const std::optional<double>& given) {
+  if (given) return given;
   const auto open = datum.find(" (");
   if (open == std::string_view::npos) return std::nullopt;
   double year = 0;

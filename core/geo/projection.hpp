@@ -16,8 +16,9 @@ namespace anchord {
 /// at all.
 std::optional<int> geographic_epsg(std::string_view datum);
 
-/// The year in brackets behind it: "ITRF2014 (2026.3)". Nothing where there is none.
-std::optional<double> stated_epoch_year(std::string_view datum);
+/// The epoch that is given, else the year in brackets behind the datum: "ITRF2014 (2026.3)". Nothing where
+/// there is none.
+std::optional<double> stated_epoch_year(std::string_view datum, const std::optional<double>& given = {});
 
 /// Map coordinates of an EPSG code, by PROJ with what is installed (never the network, never a "ballpark"
 /// that leaves out a datum shift). Safe to use from any thread.

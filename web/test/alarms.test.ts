@@ -107,6 +107,21 @@ describe('Conditions', () => {
     const [a] = merged([], server, 1, 1, true, screen);
     expect([a!.title, a!.acknowledged]).toEqual(['Disk is low, when last seen', true]);
   });
+  it('that name their flight already are left as they are, its name written as it was given', () => {
+    const of = (mission: string, text: string) => ({
+      id: 'rtk.lost',
+      priority: 'critical' as const,
+      since_us: 0,
+      text,
+      acknowledged: false,
+      mission,
+    });
+    const list = merged([], [of('m1', 'east: no position'), of('m2', 'west: no position')], 1, 1, false, {
+      mission: 'm1',
+      name: (id) => (id === 'm1' ? 'east' : 'west'),
+    });
+    expect(list.map((a) => a.title)).toEqual(['east: no position', 'west: no position']);
+  });
   it('of another flight stand beside those of the flight on the screen, with its name', () => {
     const of = (mission: string | null, id: string, text: string) => ({
       id,

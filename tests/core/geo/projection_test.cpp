@@ -106,6 +106,7 @@ TEST(Projection, KnowsDatumsByTheirWordsAndNothingByGuess) {
 
 TEST(Projection, ReadsTheEpochBehindADatum) {
   EXPECT_EQ(stated_epoch_year("ITRF2014 (2026.3)"), 2026.3);
+  EXPECT_EQ(stated_epoch_year("ITRF2014 (2026.3)", 2020.5), 2020.5) << "given apart, it is the newer word";
   EXPECT_FALSE(stated_epoch_year("ITRF2014").has_value());
   EXPECT_FALSE(stated_epoch_year("NAD83(2011)").has_value());
   EXPECT_FALSE(stated_epoch_year("ITRF2014 (soon)").has_value());

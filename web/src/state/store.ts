@@ -213,7 +213,7 @@ export function back_words(
   resynchronised: boolean,
 ): string {
   const back = outage_ms === null ? 'Connected again' : `Link back after ${age(outage_ms)}`;
-  if (resynchronised) return `${back}. Resynchronised: all values are those of the server`;
+  if (resynchronised) return `${back}. Resynchronised with the server`;
   const what = [...recovered].map(([topic, n]) => `${n} of ${TOPIC_WORDS[topic] ?? topic.replaceAll('.', ' ')}`);
   return what.length ? `${back}, recovered messages: ${what.join(', ')}` : `${back}. Nothing was missed`;
 }

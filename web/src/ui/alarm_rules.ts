@@ -148,10 +148,10 @@ export interface Screen {
   readonly mission: string | null;
   readonly name: (mission: string) => string;
 }
-const capital = (text: string): string => text.slice(0, 1).toUpperCase() + text.slice(1);
 
-/// Server's list and the page's own, once per id and flight; the server's word wins where both speak. Of a flight that is not on the screen an alarm has
-/// its name before it, and never stands for the same one of the flight that is. With the link lost the words are those that were heard last.
+/// Server's list and the page's own, once per id and flight; the server's word wins where both speak. An alarm of a flight that is not on the screen has
+/// its name before it (most of the server's have), and never stands for the same one of the flight that is. With the link lost the words are those that
+/// were heard last.
 export function merged(
   own: readonly Alarm[],
   server: readonly AlarmMsg[],
@@ -162,13 +162,17 @@ export function merged(
 ): Alarm[] {
   const named = new Map(own.map((a) => [a.id, a]));
   for (const a of server) {
-    const elsewhere = a.mission !== null && a.mission !== screen.mission ? a.mission : null,
-      id = elsewhere ? `${a.id} of ${elsewhere}` : a.id,
-      text = capital(a.text || a.id);
+    const elsewhere = a.mission && a.mission !== screen.mission,
+      id = elsewhere ? `${a.id} of ${a.mission}` : a.id,
+      name = a.mission && screen.name(a.mission),
+      text = a.text || a.id;
     const known: Alarm = {
       id,
       priority: a.priority,
-      title: elsewhere ? `Flight ${screen.name(elsewhere)}: ${text}` : text,
+      title:
+        name && text.startsWith(name)
+          ? text
+          : (elsewhere ? `Flight ${name}: ` : '') + text[0]!.toUpperCase() + text.slice(1),
       advice: named.get(id)?.advice ?? '',
       since_ms: now_ms - Math.max(0, server_now_us - a.since_us) / 1000,
       acknowledged: a.acknowledged,

@@ -37,7 +37,7 @@ export const alarms = computed<readonly Alarm[]>(() => {
   });
   const screen = {
     mission: mission?.mission ?? null,
-    name: (id: string): string => mission_list.value.find((m) => m.mission === id)?.name || id.slice(0, 8),
+    name: (id: string): string => mission_list.value.find((m) => m.mission === id)?.name || id.slice(-8),
   };
   return merged(own, server_alarms.value, server_now_us(), now, link.value === 'lost', screen).map((a) =>
     acknowledged.value.has(a.id) ? { ...a, acknowledged: true } : a,

@@ -41,8 +41,8 @@ const WORDS: Record<string, Words> = {
     unit: '×',
   },
   own_delay: {
-    passes: 'Its ranges have no delay of their own',
-    fails: 'Its ranges alone are too long or too short',
+    passes: 'No delay of its ranges alone is seen',
+    fails: 'Its ranges are too long or too short, unlike those of the other anchors',
     unit: 'm',
   },
   residual_scale: { passes: 'Residuals are small', fails: 'Residuals are too large', unit: 'm' },
@@ -53,8 +53,8 @@ const WORDS: Record<string, Words> = {
   },
   halves: { passes: 'The two halves of the flight agree', fails: 'The two halves of the flight disagree', unit: 'χ²' },
   second_place: {
-    passes: 'Its ranges agree on one position',
-    fails: 'Part of its ranges agrees on another position',
+    passes: 'No other position agrees with many of its ranges',
+    fails: 'A part of its ranges agrees on another position',
     unit: '%',
   },
   flights: { passes: 'The flights agree', fails: 'The flights disagree', unit: 'χ²' },

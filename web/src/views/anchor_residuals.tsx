@@ -74,7 +74,7 @@ export function AnchorResiduals({ row, mission }: { row: AnchorRow; mission: str
           </p>
           <Weights rows={got.rows} />
           <Doubtful
-            name={row.calibration ? `${row.anchor}, calibration ${row.calibration.slice(0, 8)}` : row.anchor}
+            name={row.calibration ? `${row.anchor}, calibration ${row.calibration.slice(-8)}` : row.anchor}
             rows={got.rows}
           />
         </>

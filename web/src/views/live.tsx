@@ -151,7 +151,7 @@ function Progress() {
           >
             {list.map((x) => (
               <option key={x.mission} value={x.mission}>
-                {names.get(x) || x.mission.slice(0, 8)}
+                {names.get(x) || x.mission.slice(-8)}
                 {x.state === 'recording' ? ' (recording)' : ''}
               </option>
             ))}

@@ -29,7 +29,7 @@ export function DevicesNote({ mission }: { mission: string }) {
   tick.value;
   const holder = devices?.held_by,
     scene = scenes.get(mission),
-    came_ms = Math.max(scene?.range_at_ms ?? -Infinity, scene?.pose?.at_ms ?? -Infinity);
+    came_ms = Math.max(scene?.range_at_ms ?? -Infinity, scene?.pose?.came_ms ?? -Infinity);
   if (!holder || !known.value.length || now_ms() - came_ms < SILENT_MS) return null;
   const take = async (): Promise<void> => {
     set_problem('');

@@ -80,7 +80,7 @@ export function Models({ path }: { path: string | null }) {
             <h1>{chosen ? method_words(chosen.method) : 'Models'}</h1>
             {chosen && (
               <span class="mut">
-                run {chosen.id.slice(0, 8)} on data set {chosen.dataset},{' '}
+                run {chosen.id.slice(-8)} on data set {chosen.dataset},{' '}
                 {chosen.seconds === null
                   ? 'begun'
                   : `trained in ${chosen.seconds < 1 ? 'less than 1' : fixed(chosen.seconds, 0)} s`}{' '}

@@ -208,7 +208,7 @@ export function Replay({ id }: { id: string | null }) {
     <div class="replay" data-testid="replay" data-positions={moment}>
       <div class="toolbar">
         <Chip shape="info" tone="info" word="REPLAY" />
-        <h1>{names.get(mission) || mission.mission.slice(0, 8)}</h1>
+        <h1>{names.get(mission) || mission.mission.slice(-8)}</h1>
         {ordered_missions.value.length > 1 && (
           <select
             aria-label="Flight to replay"
@@ -217,7 +217,7 @@ export function Replay({ id }: { id: string | null }) {
           >
             {ordered_missions.value.map((m) => (
               <option key={m.mission} value={m.mission}>
-                {names.get(m) || m.mission.slice(0, 8)}
+                {names.get(m) || m.mission.slice(-8)}
               </option>
             ))}
           </select>

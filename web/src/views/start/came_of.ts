@@ -30,7 +30,7 @@ export function came_of(answer: Imported): Came {
       : `The site is on this server: ${counted(fresh, 'flight')} of ${answer.flights.length} new.`,
     flights: answer.flights.map((f) => ({
       mission: f.mission,
-      name: f.name || f.mission.slice(0, 8),
+      name: f.name || f.mission.slice(-8),
       already: f.already,
     })),
     left_out: [...answer.left_out, ...answer.flights.flatMap((f) => f.left_out)],

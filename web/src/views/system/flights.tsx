@@ -105,7 +105,7 @@ export function FlightsPanel() {
             {all?.map((f) => (
               <tr key={f.id}>
                 <th scope="row">
-                  {f.name || f.id.slice(0, 8)}
+                  {f.name || f.id.slice(-8)}
                   <span class="mut block">{date(f.created_at)}</span>
                 </th>
                 <td>{f.state.toUpperCase()}</td>
@@ -117,7 +117,7 @@ export function FlightsPanel() {
                       class="btn small"
                       href={handover_url(f.id)}
                       download
-                      aria-label={`Download the hand-over pack of ${f.name || f.id.slice(0, 8)}`}
+                      aria-label={`Download the hand-over pack of ${f.name || f.id.slice(-8)}`}
                       data-testid="handover-flight"
                     >
                       Download
@@ -128,7 +128,7 @@ export function FlightsPanel() {
                       class="btn small"
                       href={flight_bundle_url(f.id)}
                       download
-                      aria-label={`Bundle of ${f.name || f.id.slice(0, 8)}, for another anchord server`}
+                      aria-label={`Bundle of ${f.name || f.id.slice(-8)}, for another anchord server`}
                       title="All that is stored of it, for another anchord server (Import)"
                       data-testid="bundle-flight"
                     >
@@ -143,7 +143,7 @@ export function FlightsPanel() {
                         class="btn small"
                         data-testid="finish-flight"
                         disabled={link.value === 'lost'}
-                        aria-label={`${sure === f.id ? 'Press again to finish' : 'Finish'} ${f.name || f.id.slice(0, 8)}`}
+                        aria-label={`${sure === f.id ? 'Press again to finish' : 'Finish'} ${f.name || f.id.slice(-8)}`}
                         onClick={() => finish(f)}
                       >
                         {sure === f.id ? 'Press again to finish' : 'Finish'}
@@ -153,7 +153,7 @@ export function FlightsPanel() {
                         <button
                           class="btn small"
                           data-testid="correct-flight"
-                          aria-label={`Correct ${f.name || f.id.slice(0, 8)}`}
+                          aria-label={`Correct ${f.name || f.id.slice(-8)}`}
                           onClick={() => set_corrected(f)}
                         >
                           Correct
@@ -206,7 +206,7 @@ export function FlightsPanel() {
               {bin.map((f) => (
                 <tr key={f.id}>
                   <th scope="row">
-                    {f.name || f.id.slice(0, 8)}
+                    {f.name || f.id.slice(-8)}
                     <span class="mut block">{grouped(f.n_ranges)} ranges</span>
                   </th>
                   <td>
