@@ -17,6 +17,13 @@ namespace anchord {
 
 namespace {
 
+/// About a kilometre: degrees by 100, or metres by 1000.
+using Cell = std::pair<double, double>;
+Cell cell_of(PJ_DIRECTION direction, const PJ_COORD& at) {
+  const double size = direction == PJ_FWD ? 0.01 : 1000;
+  return {std::floor(at.xy.x / size), std::floor(at.xy.y / size)};
+}
+
 struct Transformation {
   Transformation() : context(proj_context_create()) {
     proj_context_set_enable_network(context, 0);
@@ -31,6 +38,9 @@ struct Transformation {
   Transformation& operator=(const Transformation&) = delete;
   PJ_CONTEXT* context;
   PJ* operation{nullptr};
+  /// Where the change of datum was last found good, by direction: to ask PROJ takes a thousand times as long
+  /// as to transform, and anchors of a site lie together.
+  std::optional<Cell> good_forward{}, good_inverse{};
 };
 
 struct Owned {
@@ -83,7 +93,7 @@ struct Projection::Pipeline {
 
 /// Errors of the change of datum are asked for at the place: grids and parameters have areas.
 Result<PJ_COORD> Projection::Pipeline::transformed(PJ_DIRECTION direction, PJ_COORD from) {
-  const auto use = transformation.lock();
+  auto use = transformation.lock();
   const auto at = [&](double year) {
     from.xyzt.t = year;
     return proj_trans(use->operation, direction, from);
@@ -93,21 +103,22 @@ Result<PJ_COORD> Projection::Pipeline::transformed(PJ_DIRECTION direction, PJ_CO
     proj_errno_reset(use->operation);
     return make_error(Errc::invalid_argument, "the position is outside " + name);
   }
+  auto& good = direction == PJ_FWD ? use->good_forward : use->good_inverse;
+  const Cell cell = cell_of(direction, from);
+  if (good == cell) return out;
   const Owned taken{proj_trans_get_last_used_operation(use->operation)};
   const double error_m =
       proj_coordoperation_get_accuracy(use->context, taken.pj != nullptr ? taken.pj : use->operation);
   if (error_m > k_max_datum_error_m) {
-    char text[160];
-    std::snprintf(text, sizeof text,
-                  "with the grids installed the change of datum to %.60s has an error of %.2g m here "
-                  "(limit %.2g m)",
-                  name.c_str(), error_m, k_max_datum_error_m);
-    return make_error(Errc::unsupported, std::string(text) +
+    char text[60];
+    std::snprintf(text, sizeof text, " has an error of %.2g m here (limit %.2g m)", error_m,
+                  k_max_datum_error_m);
+    return make_error(Errc::unsupported, "with the grids installed the change of datum to " + name + text +
                                              ": install the grid of that country for PROJ, or name the "
                                              "frame that the base station works in (crs.frame)");
   }
-  if (epoch_year != HUGE_VAL) return out;
-  const PJ_COORD then = at(k_years[0]), later = at(k_years[1]);
+  const bool stated = epoch_year != HUGE_VAL;
+  const PJ_COORD then = stated ? out : at(k_years[0]), later = stated ? out : at(k_years[1]);
   // Degrees one way, metres the other: what does not move is the same to the last digits in both.
   const double moved_m = std::hypot(later.xy.x - then.xy.x, later.xy.y - then.xy.y) *
                          (direction == PJ_FWD ? 1 : k_metres_a_degree);
@@ -116,6 +127,7 @@ Result<PJ_COORD> Projection::Pipeline::transformed(PJ_DIRECTION direction, PJ_CO
         Errc::unsupported,
         "the frame of the base moves against " + name +
             ": state the epoch of its positions (crs.epoch of the site, a year such as 2026.5)");
+  good = cell;
   return out;
 }
 
