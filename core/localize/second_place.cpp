@@ -22,8 +22,8 @@ constexpr double k_search_m = 0.3;  // bend of the first descent: as the search 
 constexpr double k_same_end_m = 0.05;
 constexpr double k_about_as_many = 0.92, k_in_order = 0.9;
 
-// Of 243 good made anchors none had more than 12.5 % that agree, of 64 real ones none above that was off by 1 m
-// (a prototype on other flights than those of the tests).
+// Of 243 good made anchors none had more than 12.5 % that agree, of 64 real ones none above that was off by 1
+// m (a prototype on other flights than those of the tests).
 constexpr double k_share_limit = 0.13, k_apart_m = 1.5;
 constexpr double k_early_limit = 0.10, k_early_apart_m = 1.2;
 
