@@ -192,3 +192,59 @@ test('the radio of a tag is compared with every anchor in its reach', async () =
   assert.deepEqual(seen.errors, []);
   await page.close();
 });
+
+test('a flight begins on the page, records what the devices measure, is finished there, and the next one is declared alike', async () => {
+  const { network_id: tag } = await get(`/api/v1/devices/${made.good}`),
+    site = (await get('/api/v1/sites')).items.find((s) => s.name === 'yard').id;
+  const { page, seen, id } = await openPage(browser, server, { hash: '#/system/flight' });
+  const form = id('new-flight'),
+    arm = (axis) => form.getByLabel(`${tag} ${axis}, m`);
+  await arm('Forward').waitFor();
+  assert.ok(await id('begin-flight').isDisabled(), 'nobody has measured where the antenna is');
+  await form.getByLabel('Name', { exact: true }).fill('South side');
+  await form.getByLabel('Site').selectOption(site);
+  await form.getByLabel('Kit').fill('quad');
+  for (const [axis, typed] of [
+    ['Forward', '0,12'],
+    ['Left', '0'],
+    ['Up', '-0.28'],
+  ])
+    await arm(axis).fill(typed);
+  await form.getByLabel('Measured to, one sigma, m').fill('0.02');
+  assert.deepEqual(await violations(page, { sizes: true }), []);
+  await picture(page, 'new-flight-light');
+  await id('begin-flight').click();
+  await id('progress').getByText('South side').waitFor();
+  const [flight] = (await get('/api/v1/missions')).items;
+  assert.deepEqual(
+    [flight.name, flight.site, flight.kit, flight.frame, flight.track_point, flight.tags, flight.lever_arm_sigma_m],
+    [
+      'South side',
+      site,
+      'quad',
+      'wgs84',
+      'gnss_antenna',
+      [{ tag, antenna: 0, lever_arm_body_m: [0.12, 0, -0.28] }],
+      0.02,
+    ],
+  );
+  await eventually('rows arrive', async () => (await id('range-list').locator('tbody tr').count()) >= 3, 30_000);
+  assert.deepEqual(await violations(page), []);
+  await picture(page, 'recording-light');
+  await id('finish-recording').focus();
+  await page.keyboard.press('Enter');
+  await id('finish-recording').getByText('tap again').waitFor();
+  assert.equal((await get(`/api/v1/missions/${flight.id}`)).state, 'recording', 'one press asks');
+  await page.keyboard.press('Enter');
+  await eventually('it is finished', async () => (await get(`/api/v1/missions/${flight.id}`)).state === 'finished');
+  await id('next-flight').click();
+  await eventually('as before', async () => (await arm('Up').inputValue()) === '-0.28');
+  assert.deepEqual(
+    [await form.getByLabel('Kit').inputValue(), await form.getByLabel('Site').inputValue()],
+    ['quad', site],
+  );
+  assert.match(await form.getByLabel('Name', { exact: true }).inputValue(), /^Flight \d{4}-\d\d-\d\d \d\d:\d\d$/);
+  assert.ok(await id('begin-flight').isEnabled());
+  assert.deepEqual(seen.errors, []);
+  await page.close();
+});

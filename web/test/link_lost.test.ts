@@ -21,6 +21,7 @@ const STRUCK_BY: Readonly<Record<string, 'frame' | 'asks' | 'none'>> = {
   'views/flight/lease.ts': 'none',
   'views/flight/picture.ts': 'none', // drawn by the maps, which ask `Content.link_lost`
   'views/flight/procedure.tsx': 'asks',
+  'views/flight/recording.tsx': 'asks',
   'views/live.tsx': 'asks',
   'views/measurements/use_take.ts': 'frame',
   'views/plan/on_ground.tsx': 'asks',

@@ -23,6 +23,9 @@ export async function delete_flight(id: string, admin: boolean): Promise<void> {
     throw e;
   }
 }
+/// It records from now on, with the devices of the server where no other flight has them. Its id.
+export const begin_flight = async (body: Wire<'MissionCreate'>): Promise<string> =>
+  (await call('post', '/missions', { body, headers: { 'Idempotency-Key': idempotency_key() } })).body.id;
 /// Ends its recording; in the air only whoever has control of it may.
 export const finish_flight = (id: string, lease: string | null): Promise<unknown> =>
   call('post', '/missions/{id}/actions', {

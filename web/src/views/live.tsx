@@ -25,6 +25,7 @@ import { Chip, Q } from '../ui/marks';
 import { useLater } from '../ui/use_later';
 import { AnchorCard } from './anchor_card';
 import { Events } from './events';
+import { Aside, load_recording } from './flight/aside';
 import './flight/field.css';
 import './flight/flight.css';
 import { FlightBar } from './flight/commands';
@@ -81,6 +82,7 @@ export function Live() {
         <NextPoint />
         <TurnAndHeight />
         <Progress />
+        <Aside load={load_recording} mission={mission.mission} />
         <RangeList selected={selected} />
         {selected && <AnchorCard anchor={selected} />}
         <Events />

@@ -5,7 +5,7 @@ import { useLater } from '../../ui/use_later';
 type Part = ComponentType<{ mission: string }>;
 export const load_devices_note = (): Promise<Part> => import('./devices_note').then((m) => m.DevicesNote);
 export const load_flight_time = (): Promise<Part> => import('./flight_time').then((m) => m.FlightTime);
-export const load_after_landing = (): Promise<Part> => import('./after_landing').then((m) => m.AfterLanding);
+export const load_recording = (): Promise<Part> => import('./recording').then((m) => m.Recording);
 
 export function Aside({ load, mission }: { load: () => Promise<Part>; mission: string }) {
   const { part: Shown } = useLater(load);

@@ -8,7 +8,7 @@ import { now_ms, replayed, tick, watched_lost, watched_mission, watched_scene } 
 import { bearing, clock, fixed } from '../../ui/format';
 import { Chip, Mark, Q } from '../../ui/marks';
 import { Axes, Drawing, line, scale, ticks, room } from '../chart';
-import { Aside, load_after_landing, load_flight_time } from './aside';
+import { Aside, load_flight_time } from './aside';
 import {
   flying,
   grid_measure,
@@ -84,12 +84,7 @@ export function Procedure() {
           {missed}
         </p>
       )}
-      {(p.status === 'done' || p.status === 'aborted') && (
-        <>
-          <Aside load={load_flight_time} mission={p.mission} />
-          {!stored && <Aside load={load_after_landing} mission={p.mission} />}
-        </>
-      )}
+      {(p.status === 'done' || p.status === 'aborted') && <Aside load={load_flight_time} mission={p.mission} />}
       {p.ended && flying(p) && p.ended !== p.reason && <p class="why says">Why it returns: {p.ended}.</p>}
       {p.drone?.taken_over && (
         <div class="callout caution">

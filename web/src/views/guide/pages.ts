@@ -22,7 +22,8 @@ export const PAGES: readonly Page[] = [
       {
         list: [
           'Fly the demonstration: the server simulates a drone and six anchors. Positions come within a minute.',
-          'Connect my devices: the tag, the receiver and the corrections, step by step, each checked while it measures.',
+          'Connect my devices: the tag, the receiver and the corrections, step by step, each checked while it measures. New flight then' +
+            ' records what they measure, until Finish the recording in Live.',
           'Import a flight: a folder, tables or a .zip of a flight that has already been flown.',
         ],
       },
@@ -84,7 +85,8 @@ export const PAGES: readonly Page[] = [
           "Measure from the middle of the GNSS antenna's phase centre (its label gives the height above the mount) to the middle of the tag's antenna.",
           'Forward and left are positive; below the antenna is negative. Example: 12 cm ahead, 28 cm below is 0.12, 0, −0.28.',
           'State the accuracy: one sigma of the forward and left part. With a tape measure 0.02 m; by eye 0.05 m; from the drawing of the mount 0.005 m.',
-          'Give both with the flight: tags and lever_arm_sigma_m of POST /missions or of flight.json, or in Import a flight. System, Lever arms, shows them.',
+          'Give both with the flight: in New flight (System, Flights), in Import a flight, or as tags and lever_arm_sigma_m of POST /missions' +
+            ' and of flight.json. System, Lever arms, shows them.',
           'Where they were wrong, correct them after landing (System, Flights, Correct), and calibrate again.',
         ],
       },
@@ -202,6 +204,7 @@ export const PAGES: readonly Page[] = [
     blocks: [
       {
         steps: [
+          'System, Flights, New flight: name, site, kit, lever arms as measured. It records from then on, also what a pilot flies by hand.',
           'Plan: outline, fence, waypoints. The check must read CAN BE FLOWN.',
           'Batteries of aircraft, remote control, base and this device.',
           'Live, Checklist: red items name what is missing. Automatic ones turn green by themselves; the others are confirmed by a person.',

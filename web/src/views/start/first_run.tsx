@@ -69,6 +69,9 @@ export function FirstRun() {
                 <a class="btn primary" href="#/system/connect" data-testid="connect-devices">
                   Connect my devices
                 </a>
+                <a class="btn" href="#/system/flight" data-testid="first-new-flight">
+                  New flight
+                </a>
                 <a class="btn" href="#/guide/mounting">
                   Guide
                 </a>

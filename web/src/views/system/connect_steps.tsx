@@ -61,7 +61,11 @@ export function ConnectSteps({
           `${left} of ${steps.length} steps left.`
         ) : (
           <>
-            Everything measures. <a href="#/plan">Plan the flight</a>, or go to <a href="#/live">Live</a>.
+            Everything measures. <a href="#/plan">Plan the flight</a>, or{' '}
+            <a href="#/system/flight" data-testid="to-new-flight">
+              start recording
+            </a>
+            .
           </>
         )}{' '}
         <a href="#/guide/mounting">How to mount them</a>

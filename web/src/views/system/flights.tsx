@@ -20,12 +20,15 @@ import { Problem } from '../../ui/problem';
 import { useStable } from '../../ui/use_stable';
 import { lease } from '../flight/lease';
 import { FlightForm } from './flight_form';
+import { NewFlight } from './new_flight';
 
 const days = (seconds: number): string =>
   seconds < 172_800 ? `${Math.ceil(seconds / 3600)} h` : `${Math.floor(seconds / 86_400)} days`;
 
-export function FlightsPanel() {
-  const [all, set_all] = useState<readonly StoredFlight[] | null>(null),
+/// `beginning`: the page was opened to start one.
+export function FlightsPanel({ beginning }: { beginning: boolean }) {
+  const [begun, set_begun] = useState(beginning),
+    [all, set_all] = useState<readonly StoredFlight[] | null>(null),
     [bin, set_bin] = useState<readonly StoredFlight[]>([]),
     [problem, set_problem] = useState(''),
     [sure, set_sure] = useState(''),
@@ -73,16 +76,23 @@ export function FlightsPanel() {
       await load_missions();
     }, `${f.name} is back`);
   const operator = may('operator');
+  useEffect(() => set_begun(beginning), [beginning]);
   return (
     <section class="sys-p" data-testid="flights">
       <div class="hd">
         <h2>Flights</h2>
-        {may('operator') && (
+        {operator && (
+          <button class="btn small" data-testid="open-new-flight" onClick={() => set_begun(true)}>
+            New flight
+          </button>
+        )}
+        {operator && (
           <a class="btn small" href="#/import" data-testid="to-import">
             Import a flight
           </a>
         )}
       </div>
+      {operator && begun && <NewFlight close={() => set_begun(false)} />}
       <Problem text={problem} />
       <div class="scrollx">
         <table class="tbl">

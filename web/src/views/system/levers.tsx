@@ -50,8 +50,8 @@ export function LeverPanel() {
       {none && (
         <div class="callout caution" role="status">
           <b>Not set.</b> The UWB antenna counts as being at {point_words[flight.track_point]}. Measure from there to
-          the UWB antenna and give it with the next flight (tags of POST /missions, or the page of the import): an error
-          of 1 cm shifts each anchor by up to 1 cm.
+          the UWB antenna and give it with the <a href="#/system/flight">next flight</a>: an error of 1 cm shifts each
+          anchor by up to 1 cm.
         </div>
       )}
       {flight && flight.tags.length > 0 && (

@@ -16,7 +16,7 @@ import { FlightsPanel } from './flights';
 import { OrganizationsPanel } from './organizations';
 import { TimePanel } from './time';
 
-/// `part` connect: the first set-up, step by step.
+/// `part` connect: the first set-up, step by step; flight: a new one.
 export function System({ part }: { part: string | null }) {
   useEffect(() => {
     document.title = 'System - anchord';
@@ -24,7 +24,7 @@ export function System({ part }: { part: string | null }) {
   return (
     <div class="system" data-testid="system" tabIndex={0} role="region" aria-label="System">
       <h1 class="sr">System</h1>
-      {part !== null && part !== 'connect' && (
+      {part !== null && part !== 'connect' && part !== 'flight' && (
         <Unknown what="page" id={`#/system/${part}`} where="is in this dashboard">
           System is shown.
         </Unknown>
@@ -33,7 +33,7 @@ export function System({ part }: { part: string | null }) {
       <BasePanel />
       {of_every_site.value && <LeverPanel />}
       {of_every_site.value && <TimePanel />}
-      <FlightsPanel />
+      <FlightsPanel beginning={part === 'flight'} />
       <HealthPanel />
       {of_every_site.value && may('admin') && <AccessPanel />}
       {of_every_site.value && may('admin') && <OrganizationsPanel />}

@@ -1,0 +1,57 @@
+/// Where the recording of the shown flight is ended, what became of it then, and the way to the next one.
+import { useState } from 'preact/hooks';
+import { error_text } from '../../api/client';
+import { finish_flight } from '../../api/missions';
+import { may } from '../../state/session';
+import { current_mission, current_scene, link, say, tick } from '../../state/store';
+import { Problem } from '../../ui/problem';
+import { AfterLanding } from './after_landing';
+import { HoldButton } from './hold_button';
+import { lease } from './lease';
+import { flying } from './words';
+
+export function Recording({ mission }: { mission: string }) {
+  tick.value;
+  const m = current_mission.value,
+    p = current_scene()?.procedure?.value;
+  if (m?.mission !== mission) return null;
+  if (m.state !== 'recording')
+    return (
+      <section class="sec-p" data-testid="recording">
+        <AfterLanding mission={mission} />
+        {may('operator') && (
+          <a class="btn small" href="#/system/flight" data-testid="next-flight">
+            New flight
+          </a>
+        )}
+      </section>
+    );
+  return !may('operator') || (p && flying(p)) ? null : <Finish key={mission} mission={mission} name={m.name} />;
+}
+
+function Finish({ mission, name }: { mission: string; name: string }) {
+  const [problem, set_problem] = useState('');
+  const finish = async (): Promise<void> => {
+    const held = lease.peek();
+    set_problem('');
+    try {
+      await finish_flight(mission, held?.mission === mission ? held.key : null);
+      say(`${name || 'The flight'} is finished`);
+    } catch (e) {
+      set_problem(error_text(e));
+    }
+  };
+  return (
+    <section class="sec-p" data-testid="recording">
+      <HoldButton
+        testid="finish-recording"
+        disabled={link.value === 'lost'}
+        note="hold 1 s"
+        onConfirm={() => void finish()}
+      >
+        Finish the recording
+      </HoldButton>
+      <Problem text={problem} />
+    </section>
+  );
+}
