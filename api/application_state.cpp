@@ -32,7 +32,7 @@ Application::State::State(Deps d)
       running(stores.service, steady),
       router(
           stores.access, [this] { return running.now_ns(); }, prompt),
-      hub(deps.clock, "anchord " + deps.build.version),
+      hub(deps.clock, "anchord " + deps.build.version + (deps.build.git.empty() ? "" : "+" + deps.build.git)),
       events(hub, deps.clock),
       alarms(events),
       signer(ModelSigner::parse_seed(deps.model_key).value()),

@@ -63,7 +63,7 @@ const axe = readFileSync(createRequire(import.meta.url).resolve('axe-core/axe.mi
 /** What axe finds wrong on the page as it is, and whether it is wider than its window. `sizes`: of targets too, which a bar at the bottom may half cover.
  * `within`: a selector of the part that is looked at. */
 export async function violations(page, { sizes = false, within = null } = {}) {
-  await page.evaluate(axe);
+  if (!(await page.evaluate(() => 'axe' in globalThis))) await page.evaluate(axe); // it takes as long as a third of a look
   const found = await page.evaluate(
     ({ enabled, part }) =>
       globalThis.axe.run(part ?? document, { resultTypes: ['violations'], rules: { 'target-size': { enabled } } }),

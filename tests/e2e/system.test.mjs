@@ -204,29 +204,20 @@ test('a flight begins on the page, records what the devices measure, is finished
   await form.getByLabel('Name', { exact: true }).fill('South side');
   await form.getByLabel('Site').selectOption(site);
   await form.getByLabel('Kit').fill('quad');
-  for (const [axis, typed] of [
-    ['Forward', '0,12'],
-    ['Left', '0'],
-    ['Up', '-0.28'],
-  ])
-    await arm(axis).fill(typed);
+  for (const input of await form.getByLabel(/(Forward|Left|Up), m$/).all()) await input.fill('0'); // the other tag is where the antenna is
+  await arm('Forward').fill('0,12');
+  await arm('Up').fill('-0.28');
   await form.getByLabel('Measured to, one sigma, m').fill('0.02');
+  assert.ok(await id('begin-flight').isEnabled());
   assert.deepEqual(await violations(page, { sizes: true }), []);
   await picture(page, 'new-flight-light');
   await id('begin-flight').click();
   await id('progress').getByText('South side').waitFor();
-  const [flight] = (await get('/api/v1/missions')).items;
+  const [flight] = (await get('/api/v1/missions')).items,
+    arm_of = ({ tags }) => tags.find((one) => one.tag === tag).lever_arm_body_m;
   assert.deepEqual(
-    [flight.name, flight.site, flight.kit, flight.frame, flight.track_point, flight.tags, flight.lever_arm_sigma_m],
-    [
-      'South side',
-      site,
-      'quad',
-      'wgs84',
-      'gnss_antenna',
-      [{ tag, antenna: 0, lever_arm_body_m: [0.12, 0, -0.28] }],
-      0.02,
-    ],
+    [flight.name, flight.site, flight.kit, flight.frame, flight.track_point, arm_of(flight), flight.lever_arm_sigma_m],
+    ['South side', site, 'quad', 'wgs84', 'gnss_antenna', [0.12, 0, -0.28], 0.02],
   );
   await eventually('rows arrive', async () => (await id('range-list').locator('tbody tr').count()) >= 3, 30_000);
   assert.deepEqual(await violations(page), []);

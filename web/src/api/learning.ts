@@ -160,8 +160,9 @@ export const promote = (model: string, reason: string, key: string): Promise<unk
     body: reason ? { reason } : {},
     headers: { 'Idempotency-Key': key },
   });
-export const roll_back = (task: Task, key: string): Promise<unknown> =>
-  call('post', '/models/rollback', { body: { task }, headers: { 'Idempotency-Key': key } });
+/// The model that is active from then on; null: none.
+export const roll_back = async (task: Task, key: string): Promise<string | null> =>
+  (await call('post', '/models/rollback', { body: { task }, headers: { 'Idempotency-Key': key } })).body.model;
 export const cancel_job = (job: string): Promise<unknown> => call('delete', '/jobs/{id}', { path: { id: job } });
 
 /// The numbers behind one run. What it does not have is null or empty: all but the dataset before it succeeded, a ROC where it learns a bias.

@@ -15,6 +15,7 @@ import {
 } from '../../api/learning';
 import { may } from '../../state/session';
 import { jobs_version, link, say } from '../../state/store';
+import { run_names } from './words';
 
 export const task = signal<Task>('nlos_id');
 
@@ -113,8 +114,9 @@ export function useModels(path: string | null) {
     shown = page && page.run.id === chosen?.id ? page : null;
   const undo = async (): Promise<void> => {
     try {
-      await roll_back(of, idempotency_key());
-      say('Rolled back');
+      const id = await roll_back(of, idempotency_key()),
+        named = id && run_names(models).get(id);
+      say(`Rolled back: ${id ? named || id : 'no model'} is active`);
       reload();
     } catch (e) {
       set_problem(error_text(e));

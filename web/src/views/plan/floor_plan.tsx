@@ -26,6 +26,7 @@ import { fixed } from '../../ui/format';
 import { Icon } from '../../ui/marks';
 import { Problem } from '../../ui/problem';
 import { useDialog } from '../../ui/use_dialog';
+import { useDraft } from '../../ui/use_draft';
 
 type Corner = { readonly lon: number; readonly lat: number };
 interface Row {
@@ -82,7 +83,7 @@ export function FloorPlanDialog({ corners, close, use_outline }: Props) {
   return (
     <section class="drawer floorplan" {...box} aria-labelledby="floorplan-title" data-testid="floor-plan">
       <div class="hd big">
-        <h2 id="floorplan-title">Floor plan</h2>
+        <h2 id="floorplan-title">Floor plan{held && `: ${held.floor.name}, level ${held.floor.level}`}</h2>
         <span class="grow" />
         <button class="btn quiet" aria-label="Close" onClick={close}>
           <Icon name="close" />
@@ -235,12 +236,15 @@ function Placed({
   busy: string;
   keep: (points: Click[], length_m: number | null) => void;
 }) {
-  const [rows, set_rows] = useState<readonly Row[]>([]),
-    [measured, set_measured] = useState(''),
+  const plan = held.floor.plan!,
+    // Clicked with care: there again after Escape, and after a reload.
+    [{ rows, measured }, change_draft] = useDraft<{ rows: readonly Row[]; measured: string }>(
+      `floor-plan/${held.floor.id}/${plan.sha256}`,
+      { rows: [], measured: '' },
+    ),
     [fit, set_fit] = useState<Georeference | null>(held.floor.georeference),
     [problem, set_problem] = useState('');
-  const plan = held.floor.plan!,
-    points = clicks_of(rows),
+  const points = clicks_of(rows),
     complete = points.length === rows.length && rows.length >= 2,
     length_m = length_of(measured),
     asked = complete && length_m !== undefined ? JSON.stringify({ points, length_m }) : '';
@@ -261,7 +265,8 @@ function Placed({
       gone = true;
     };
   }, [asked, held]);
-  const change = (i: number, place: string): void => set_rows(rows.map((r, k) => (k === i ? { ...r, place } : r)));
+  const set_rows = (next: readonly Row[]): void => change_draft({ rows: next }),
+    change = (i: number, place: string): void => set_rows(rows.map((r, k) => (k === i ? { ...r, place } : r)));
   return (
     <>
       <p class="why">
@@ -350,7 +355,7 @@ function Placed({
             value={measured}
             data-testid="known-length"
             aria-invalid={length_m === undefined}
-            onInput={(e) => set_measured(e.currentTarget.value)}
+            onInput={(e) => change_draft({ measured: e.currentTarget.value })}
           />
           {length_m === undefined && <span class="bad"> is not a length in metres</span>}
         </label>

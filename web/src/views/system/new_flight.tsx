@@ -1,5 +1,5 @@
 /// A new flight: declared as the last one was, then it records what the devices of this server measure.
-import { useState } from 'preact/hooks';
+import { useEffect, useRef, useState } from 'preact/hooks';
 import { error_text } from '../../api/client';
 import { devices as fetch_devices, type Device } from '../../api/devices';
 import { begin_flight, stored_flights, type StoredFlight } from '../../api/missions';
@@ -34,7 +34,11 @@ export function NewFlight({ close }: { close: () => void }) {
   const [declared, set_declared] = useState<Declared | null>(null),
     [driven, set_driven] = useState<readonly Device[]>([]),
     [problem, set_problem] = useState(''),
-    [busy, set_busy] = useState(false);
+    [busy, set_busy] = useState(false),
+    form = useRef<HTMLFormElement>(null),
+    there = declared !== null;
+  // It may be far down the page.
+  useEffect(() => form.current?.querySelector('input')?.focus(), [there]);
   useLoad(() => {
     Promise.all([fetch_devices(), stored_flights()]).then(
       ([all, flights]) => {
@@ -70,6 +74,7 @@ export function NewFlight({ close }: { close: () => void }) {
   };
   return (
     <form
+      ref={form}
       class="callout device-form"
       data-help="lever-arm"
       data-testid="new-flight"
