@@ -1,5 +1,8 @@
 #include <CLI/CLI.hpp>
+#include <cerrno>
 #include <cstdio>
+#include <cstring>
+#include <iostream>
 #include <utility>
 
 #include "core/base/guard.hpp"
@@ -51,6 +54,19 @@ constexpr Command k_commands[]{
     {"", anchord::cli::add_worker_command},
 };
 
+/// Whether all of the output has left: a full disk behind `>` shows only when the last of it is written.
+bool printed() {
+  std::cout.flush();
+  errno = 0;
+  if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0 && std::cout) return true;
+  const int why = errno;
+  // Who reads no further (`| head`) needs no explanation.
+  if (why != EPIPE)
+    std::fprintf(stderr, "anchord: cannot write the output%s%s\n", why != 0 ? ": " : "",
+                 why != 0 ? std::strerror(why) : "");
+  return false;
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -82,5 +98,6 @@ int main(int argc, char** argv) {
       }
     }
   });
+  if (!printed() && exit_code == 0) exit_code = 1;
   return ran ? exit_code : 1;
 }

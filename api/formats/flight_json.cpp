@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/base/to_wire.hpp"
+#include "core/base/whole_file.hpp"
 
 namespace anchord {
 namespace {
@@ -241,11 +242,7 @@ Result<void> write_flight_json(const FlightDeclaration& flight, const std::files
                             {"lever_arm_body_m", {arm.x(), arm.y(), arm.z()}}});
   }
   if (mission.lever_arm_sigma_m) json["lever_arm_sigma_m"] = *mission.lever_arm_sigma_m;
-  std::ofstream out(file, std::ios::binary);
-  out << to_wire(json, 1) << '\n';
-  out.close();
-  if (!out) return make_error(Errc::storage_unavailable, file.string() + ": cannot be written");
-  return boost::outcome_v2::success();
+  return write_whole(file, to_wire(json, 1) + '\n');
 }
 
 }  // namespace anchord

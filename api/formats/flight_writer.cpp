@@ -6,6 +6,7 @@
 #include "api/formats/flight_folder.hpp"
 #include "api/formats/flight_json.hpp"
 #include "api/wire/exclusion_json.hpp"
+#include "core/base/whole_file.hpp"
 
 namespace anchord {
 namespace {
@@ -21,15 +22,10 @@ void row(std::ofstream& out, const char* format, Args... args) {
 /// Of a literal, so it ends with a 0.
 const char* word(FixClass fix) { return k_fix_words.word(fix).data(); }
 
-Result<void> closed(std::ofstream& out, const std::filesystem::path& file) {
-  out.close();
-  if (!out) return make_error(Errc::storage_unavailable, file.string() + ": cannot be written");
-  return boost::outcome_v2::success();
-}
-
 Result<void> write_track(const FlightData& flight, UtcTime epoch, bool attitude,
                          const std::filesystem::path& file) {
-  std::ofstream out(file, std::ios::binary);
+  WholeFile whole(file);
+  auto& out = whole.out();
   const bool globe = flight.mission.frame == TrackFrame::wgs84;
   out << (globe ? "t_s,lat_deg,lon_deg,alt_m" : "t_s,x_m,y_m,z_m") << ",fix,sd_h_m,sd_v_m"
       << (attitude ? ",qx,qy,qz,qw" : "") << '\n';
@@ -58,11 +54,12 @@ Result<void> write_track(const FlightData& flight, UtcTime epoch, bool attitude,
     }
     out << '\n';
   }
-  return closed(out, file);
+  return whole.put_in_place();
 }
 
 Result<void> write_ranges(const FlightData& flight, UtcTime epoch, const std::filesystem::path& file) {
-  std::ofstream out(file, std::ios::binary);
+  WholeFile whole(file);
+  auto& out = whole.out();
   const bool pairs = std::any_of(flight.ranges.begin(), flight.ranges.end(),
                                  [](const Range& r) { return r.kind == RangeKind::anchor_anchor; });
   out << "t_s,tag_id,antenna,anchor_id,range_m,rx_dbm,fp_dbm,rss_dbm,seq" << (pairs ? ",kind\n" : "\n");
@@ -84,7 +81,7 @@ Result<void> write_ranges(const FlightData& flight, UtcTime epoch, const std::fi
     if (pairs) out << (range.kind == RangeKind::anchor_anchor ? ",anchor_anchor" : ",tag_anchor");
     out << '\n';
   }
-  return closed(out, file);
+  return whole.put_in_place();
 }
 
 }  // namespace
@@ -104,9 +101,7 @@ Result<void> write_flight_folder(const FlightData& flight, const std::filesystem
   BOOST_OUTCOME_TRY(write_track(flight, epoch, declaration.quaternion, folder / "track.csv"));
   BOOST_OUTCOME_TRY(write_ranges(flight, epoch, folder / "ranges.csv"));
   if (flight.exclusions.empty()) return boost::outcome_v2::success();
-  std::ofstream out(folder / "exclusions.json", std::ios::binary);
-  out << exclusions_file_json(flight.exclusions);
-  return closed(out, folder / "exclusions.json");
+  return write_whole(folder / "exclusions.json", exclusions_file_json(flight.exclusions));
 }
 
 }  // namespace anchord

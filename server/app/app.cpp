@@ -177,6 +177,10 @@ Result<void> App::State::open_rows(const Waiting& waiting) {
     standby->wait_for(other, url);
     if (ready) ready();
   };
+  wish.cannot = [](std::string_view why) {
+    log(LogLevel::warning, "standing by, but the database cannot be asked; it is tried again",
+        {{"why", std::string(why)}});
+  };
   wish.lost = [this](std::string_view why) { abandon(why); };
   BOOST_OUTCOME_TRY(database, open_store(address, options, std::move(wish)));
   if (!address.empty())

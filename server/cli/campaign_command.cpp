@@ -1,11 +1,12 @@
 #include <CLI/CLI.hpp>
 #include <cstdio>
-#include <fstream>
 #include <memory>
 
 #include "api/formats/campaign.hpp"
 #include "core/base/text.hpp"
+#include "core/base/whole_file.hpp"
 #include "server/cli/commands.hpp"
+#include "server/cli/failed.hpp"
 #include "server/cli/learning_data.hpp"
 #include "server/cli/words.hpp"
 
@@ -58,12 +59,8 @@ int import(const CampaignArguments& a) {
     print_report(read.value().report, stderr);
     return 0;
   }
-  std::ofstream file(a.out, std::ios::binary);
-  file << api::campaign_csv(read.value().campaign);
-  if (!file.flush()) {
-    std::fprintf(stderr, "anchord campaign: cannot write %s\n", a.out.c_str());
-    return 1;
-  }
+  if (const auto written = write_whole(a.out, api::campaign_csv(read.value().campaign)); !written)
+    return failed("anchord campaign", written.error().message);
   print_report(read.value().report, stdout);
   return 0;
 }

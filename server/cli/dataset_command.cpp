@@ -5,7 +5,9 @@
 
 #include "api/learning/freeze_rows.hpp"
 #include "api/learning/labelled_dataset.hpp"
+#include "core/base/whole_file.hpp"
 #include "server/cli/commands.hpp"
+#include "server/cli/failed.hpp"
 #include "server/cli/learning_data.hpp"
 #include "server/cli/words.hpp"
 
@@ -41,10 +43,8 @@ int build(const DatasetArguments& a) {
   const auto set = api::freeze_rows(api::dataset_rows(table.value(), a.campaign), how, std::move(dropped));
   if (!set) return refuse("dataset", a.data.files.front() + ": " + set.error().message);
   const auto csv = set.value().table.csv();
-  if (!write_whole(a.out, csv)) {
-    std::fprintf(stderr, "anchord dataset: cannot write %s\n", a.out.c_str());
-    return 1;
-  }
+  if (const auto written = write_whole(a.out, csv); !written)
+    return failed("anchord dataset", written.error().message);
   print_set(set.value(), api::dataset_digest(csv));
   return 0;
 }

@@ -255,9 +255,7 @@ int run(const Decode& options) {
   if (input.error() != 0)
     std::fprintf(stderr, "anchord decode: reading of %s failed: %s\n", options.file.c_str(),
                  std::strerror(input.error()));
-  const bool unwritten = std::fflush(stdout) != 0 || std::ferror(stdout) != 0;
-  if (unwritten) std::fprintf(stderr, "anchord decode: cannot write the output\n");
-  if (input.error() != 0 || unwritten) return 2;
+  if (input.error() != 0 || std::fflush(stdout) != 0 || std::ferror(stdout) != 0) return 2;
   return found.epochs > 0 ? 0 : 1;
 }
 

@@ -252,6 +252,7 @@ std::vector<Finding> devices_of(server::HttpClient& client) {
   for (const auto& one : items) {
     const auto text = [&](const char* key) { return text_of(one, key); };
     const auto state = text("state");
+    if (state.empty()) continue;  // a radio that was received, no device of this server
     const bool well = state == "talking" || state == "off";
     const std::string name = text("name").empty() ? text("address") : text("name");
     out.push_back({well ? Level::ok : Level::warning, "device",

@@ -36,6 +36,9 @@ int check_standby(const HealthcheckOptions& options, const std::string& why_not_
   const auto facts = look_at_postgres(options.database);
   if (!facts) return unhealthy(why_not_ready + "; " + facts.error().message);
   if (!of_this_machine(facts.value().standby)) return unhealthy(why_not_ready);
+  if (facts.value().server.empty())
+    return unhealthy(
+        "this server stands by, no server has the database, and it cannot take over: see its log");
   std::printf("standing by for %s\n", printable(facts.value().server).c_str());
   return 0;
 }

@@ -121,17 +121,6 @@ Result<FrozenRows> rows_for(const DataOptions& o, const FrozenFile& file, ml::Ta
   return out;
 }
 
-bool write_whole(const std::string& path, const std::string& text) {
-  const std::string beside = path + ".part";
-  std::ofstream file(beside, std::ios::binary);
-  file << text;
-  file.close();
-  std::error_code failed;
-  if (file) std::filesystem::rename(beside, path, failed);
-  if (!file || failed) std::filesystem::remove(beside, failed);
-  return static_cast<bool>(file) && !failed;
-}
-
 int refuse(const char* command, const std::string& message) {
   std::fprintf(stderr, "anchord %s: %s\n", command, printable(message).c_str());
   return 2;

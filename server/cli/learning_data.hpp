@@ -51,9 +51,6 @@ Result<FrozenRows> rows_for(const DataOptions& options, const FrozenFile& file, 
 /// with the file's name
 Result<ml::Model> read_model_file(const std::string& path);
 
-/// Written beside and renamed, so that whoever dies half-way leaves no half file.
-bool write_whole(const std::string& path, const std::string& text);
-
 /// "x: message" on stderr; the exit code.
 int refuse(const char* command, const std::string& message);
 

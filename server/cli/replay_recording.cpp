@@ -4,7 +4,6 @@
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
-#include <fstream>
 #include <iostream>
 #include <map>
 #include <nlohmann/json.hpp>
@@ -15,6 +14,7 @@
 #include "api/wire/rows_json.hpp"
 #include "core/base/text.hpp"
 #include "core/base/to_wire.hpp"
+#include "core/base/whole_file.hpp"
 #include "core/types/mission.hpp"
 #include "drivers/device/replay.hpp"
 #include "server/cli/failed.hpp"
@@ -211,12 +211,13 @@ int derive_recording(const std::string& file, const std::string& folder) {
   if (folder == "-") return to_streams(file, std::cout, std::cout);
   std::error_code error;
   std::filesystem::create_directories(folder, error);
-  std::ofstream fixes(folder + "/fixes.ndjson"), ranges(folder + "/ranges.ndjson");
-  if (!fixes || !ranges) return failed("anchord replay", "cannot write into " + folder);
-  const int code = to_streams(file, fixes, ranges);
-  fixes.close();
-  ranges.close();
-  return fixes && ranges ? code : 1;
+  WholeFile fixes(folder + "/fixes.ndjson"), ranges(folder + "/ranges.ndjson");
+  if (!fixes.out() || !ranges.out()) return failed("anchord replay", "cannot write into " + folder);
+  const int code = to_streams(file, fixes.out(), ranges.out());
+  for (auto* const out : {&fixes, &ranges})
+    if (const auto written = out->put_in_place(); !written)
+      return failed("anchord replay", written.error().message);
+  return code;
 }
 
 }  // namespace anchord::cli

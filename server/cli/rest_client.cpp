@@ -3,11 +3,11 @@
 #include <algorithm>
 #include <chrono>
 #include <cstdlib>
-#include <fstream>
 #include <thread>
 
 #include "api/measurements/flight_requests.hpp"
 #include "server/http/http_client.hpp"
+#include "server/runtime/token_file.hpp"
 
 namespace anchord::cli {
 namespace {
@@ -104,10 +104,7 @@ Result<std::string> read_token_file(const std::string& path) {
     const char* given = std::getenv("ANCHORD_TOKEN");
     return std::string(given == nullptr ? "" : given);
   }
-  std::ifstream in(path);
-  std::string token;
-  if (!(in >> token)) return make_error(Errc::invalid_argument, path + ": no access token in this file");
-  return token;
+  return server::token_in(path);
 }
 
 }  // namespace anchord::cli

@@ -1,13 +1,14 @@
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <filesystem>
-#include <fstream>
 #include <memory>
 
 #include "api/formats/flight_folder.hpp"
 #include "core/base/text.hpp"
+#include "core/base/whole_file.hpp"
 #include "drivers/sim/flight.hpp"
 #include "server/cli/commands.hpp"
+#include "server/cli/failed.hpp"
 #include "server/cli/simulate_devices.hpp"
 #include "server/cli/simulate_drone.hpp"
 #include "server/cli/simulate_site.hpp"
@@ -16,18 +17,17 @@ namespace anchord::cli {
 namespace {
 
 /// For judging only, never read by the product: the layout of the other flight folders' anchors_truth.csv.
-bool write_truth(const sim::SimulatedFlight& flight, const std::filesystem::path& path) {
-  std::ofstream file(path);
-  file << "anchor_id,lat_deg,lon_deg,alt_m,e_m,n_m,u_m\n";
+Result<void> write_truth(const sim::SimulatedFlight& flight, const std::filesystem::path& path) {
+  WholeFile file(path);
+  file.out() << "anchor_id,lat_deg,lon_deg,alt_m,e_m,n_m,u_m\n";
   for (const auto& [id, at] : flight.truth_wgs84) {
     const Eigen::Vector3d& enu_m = flight.truth_enu_m.at(id);
     char line[200];
     std::snprintf(line, sizeof line, "%s,%.10f,%.10f,%.4f,%.4f,%.4f,%.4f\n", to_string(id).c_str(),
                   at.lat_deg, at.lon_deg, at.height_m, enu_m.x(), enu_m.y(), enu_m.z());
-    file << line;
+    file.out() << line;
   }
-  file.close();
-  return static_cast<bool>(file);
+  return file.put_in_place();
 }
 
 int simulate(const sim::SimulationOptions& options, const std::filesystem::path& folder) {
@@ -36,14 +36,10 @@ int simulate(const sim::SimulationOptions& options, const std::filesystem::path&
     std::fprintf(stderr, "anchord simulate: %s\n", printable(flight.error().message).c_str());
     return 2;
   }
-  if (const auto written = write_flight_folder(flight.value().data, folder); !written) {
-    std::fprintf(stderr, "anchord simulate: %s\n", printable(written.error().message).c_str());
-    return 1;
-  }
-  if (!write_truth(flight.value(), folder / "anchors_truth.csv")) {
-    std::fprintf(stderr, "anchord simulate: cannot write %s\n", (folder / "anchors_truth.csv").c_str());
-    return 1;
-  }
+  if (const auto written = write_flight_folder(flight.value().data, folder); !written)
+    return failed("anchord simulate", written.error().message);
+  if (const auto written = write_truth(flight.value(), folder / "anchors_truth.csv"); !written)
+    return failed("anchord simulate", written.error().message);
   std::fprintf(stderr, "%s: %zu ranges of %zu anchors, %zu fixes, %.0f s, seed %llu\n", folder.c_str(),
                flight.value().data.ranges.size(), flight.value().truth_wgs84.size(),
                flight.value().data.fixes.size(), options.duration_s,

@@ -11,9 +11,11 @@
 #include "api/formats/flight_folder.hpp"
 #include "api/learning/flight_models.hpp"
 #include "core/base/text.hpp"
+#include "core/base/whole_file.hpp"
 #include "core/localize/flight_solver.hpp"
 #include "core/localize/kit_prior.hpp"
 #include "server/cli/commands.hpp"
+#include "server/cli/failed.hpp"
 #include "server/cli/flight_source.hpp"
 #include "server/cli/learning_data.hpp"
 #include "server/cli/solve_report.hpp"
@@ -255,13 +257,9 @@ int fit_profile(const Arguments& a) {
     if (!solution.placed)
       return complain(make_error(Errc::too_few_observations, solution.name + ": " + solution.notes.front()));
   }
-  std::ofstream out(a.out, std::ios::binary);
-  out << kit_profile_json(profile);
-  out.close();
-  if (!out) {
-    std::fprintf(stderr, "anchord: %s: cannot be written\n", a.out.c_str());
-    return 1;
-  }
+  // It may be the profile of flights before, which are not at hand any more.
+  if (const auto written = write_whole(a.out, kit_profile_json(profile)); !written)
+    return failed("anchord profile", written.error().message);
   std::fprintf(stderr, "profile of kit %s from %zu flights in %s\n", profile.kit.c_str(),
                profile.factors.size(), a.out.c_str());
   return 0;

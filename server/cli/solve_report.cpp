@@ -2,7 +2,6 @@
 
 #include <array>
 #include <cmath>
-#include <fstream>
 #include <limits>
 #include <map>
 #include <nlohmann/json.hpp>
@@ -11,6 +10,7 @@
 #include "api/formats/csv_table.hpp"
 #include "api/formats/report.hpp"
 #include "api/wire/budget_json.hpp"
+#include "core/base/whole_file.hpp"
 #include "core/geo/enu.hpp"
 
 namespace anchord::cli {
@@ -89,11 +89,7 @@ Result<void> write_solve_report(const FlightData& flight, const FlightSolution& 
       {"Radio", flight.mission.radio.empty() ? "not named" : flight.mission.radio},
       {"Datum", flight.mission.frame == TrackFrame::wgs84 ? "of the base, not stated" : "local metres"}};
   api::describe(report, {flight.mission}, "{}");
-  std::ofstream out(wanted.file, std::ios::binary);
-  out << report_html(report);
-  out.close();
-  if (!out) return make_error(Errc::storage_unavailable, wanted.file.string() + ": cannot be written");
-  return boost::outcome_v2::success();
+  return write_whole(wanted.file, report_html(report));
 }
 
 }  // namespace anchord::cli

@@ -1,14 +1,15 @@
 #include <CLI/CLI.hpp>
 #include <cstdio>
-#include <fstream>
 
 #include "api/admin/support_bundle.hpp"
 #include "api/measurements/flight_requests.hpp"
 #include "core/base/text.hpp"
 #include "core/base/time.hpp"
+#include "core/base/whole_file.hpp"
 #include "server/cli/commands.hpp"
 #include "server/cli/config_flags.hpp"
 #include "server/cli/doctor.hpp"
+#include "server/cli/failed.hpp"
 #include "server/cli/server_address.hpp"
 #include "server/http/http_client.hpp"
 
@@ -63,13 +64,10 @@ void add_support_command(CLI::App& app, int& exit_code) {
       exit_code = 1;
       return;
     }
-    std::ofstream file(options->out, std::ios::binary);
-    file << (served ? served->value() : from_here(*options));
-    file.close();
-    if (!file) {
-      std::fprintf(stderr, "anchord: %s cannot be written: give another file with --out\n",
-                   options->out.c_str());
-      exit_code = 1;
+    const auto written = write_whole(options->out, served ? served->value() : from_here(*options));
+    if (!written) {
+      exit_code =
+          failed("anchord support-bundle", written.error().message + "; give another file with --out");
       return;
     }
     std::printf("%s\n", options->out.c_str());

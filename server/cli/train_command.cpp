@@ -3,13 +3,14 @@
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
-#include <fstream>
 #include <memory>
 #include <set>
 
 #include "api/learning/labelled_dataset.hpp"
 #include "api/learning/model_artifact.hpp"
+#include "core/base/whole_file.hpp"
 #include "server/cli/commands.hpp"
+#include "server/cli/failed.hpp"
 #include "server/cli/learning_data.hpp"
 #include "server/cli/words.hpp"
 
@@ -156,10 +157,8 @@ int train(const TrainArguments& a) {
   info.code_version = ANCHORD_VERSION;
   info.not_for_live = not_for_live;
   if (!digest.empty()) info.data_digest = digest;
-  if (!write_whole(a.out, api::write_model_artifact(learned.value().model))) {
-    std::fprintf(stderr, "anchord train: cannot write %s\n", a.out.c_str());
-    return 1;
-  }
+  if (const auto written = write_whole(a.out, api::write_model_artifact(learned.value().model)); !written)
+    return failed("anchord train", written.error().message);
   const auto text = a.json ? api::train_json(learned.value(), report, a.out)
                            : api::train_text(learned.value(), report, a.out);
   std::fputs(text.c_str(), stdout);

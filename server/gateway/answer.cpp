@@ -71,7 +71,7 @@ std::optional<Assessment> assess_trouble(int status, const std::map<std::string,
           Link::unauthorized,
           told(status, body) +
               ": the token is not (or no longer) valid on this server. Create one there with 'anchord token "
-              "create NAME --role gateway --role viewer' and write it to the token file; it is read "
+              "create --name NAME --role gateway --role viewer' and write it to the token file; it is read "
               "again at every attempt",
           asked);
     case 403:

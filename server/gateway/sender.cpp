@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <condition_variable>
-#include <fstream>
 #include <nlohmann/json.hpp>
 #include <random>
 #include <set>
@@ -13,6 +12,7 @@
 #include "core/base/locked.hpp"
 #include "server/gateway/delivery.hpp"
 #include "server/http/http_client.hpp"
+#include "server/runtime/token_file.hpp"
 
 namespace anchord::gateway {
 namespace {
@@ -33,13 +33,6 @@ constexpr milliseconds k_hold_time{60'000};
 constexpr milliseconds k_note_every{60'000};
 /// A restart in flight goes on with its mission; one of the next morning must not.
 constexpr double k_remember_s = 15 * 60;
-
-std::string first_word(const std::filesystem::path& file) {
-  std::ifstream in(file);
-  std::string word;
-  in >> word;
-  return word;
-}
 
 /// The mission that has the devices of the server, in an answer to GET /missions.
 Result<std::optional<MissionId>> holder_in(std::string_view body) {
@@ -300,7 +293,10 @@ class Sender::Impl {
   // --- requests --------------------------------------------------------------------------------------------
   Result<server::ClientResponse> call(std::string_view method, const std::string& target,
                                       const std::string& body, std::string_view type) {
-    if (token_.empty() || link_ != Link::up) token_ = first_word(options_.token_file);
+    if (token_.empty() || link_ != Link::up) {
+      const auto token = server::token_in(options_.token_file);
+      token_ = token ? token.value() : std::string();
+    }
     std::map<std::string, std::string> headers;
     if (!token_.empty()) headers.emplace("Authorization", "Bearer " + token_);
     auto answer = client_.call(method, target, body, type, headers);

@@ -180,19 +180,24 @@ std::string DataFolder::recovery_commands() const {
   const std::string db = shell_quoted(database());
   const std::string recovered = shell_quoted(dir_ / "recovered.db");
   const std::string saved = shell_quoted(dir_.string() + ".damaged");
-  return "Nothing was changed. Stop every anchord, then make a copy of all files, and either save what can "
-         "be read or restore the newest backup:\n"
+  return "Nothing was changed. Stop every anchord, then make a copy of all files, and restore the newest "
+         "backup (of --backup-dir, "
+         "where that is set; the highest number is the newest):\n"
          "  cp -a " +
          shell_quoted(dir_) + " " + saved +
          "\n"
+         "  anchord backup restore \"$(ls " +
+         shell_quoted(backups()) + "/anchord-*.db | tail -1)\" --data-dir " + shell_quoted(dir_) +
+         "\n"
+         "Or save what can be read, and look how many ranges that is before it takes the place of the "
+         "database:\n"
          // Not .recover: that of Debian 12's sqlite3 answers "SQL logic error" to every database.
          "  (echo 'PRAGMA application_id=1095648072;'; echo \"PRAGMA user_version=$(sqlite3 " +
          db + " 'PRAGMA user_version');\"; sqlite3 " + db +
-         " .dump | sed 's/^ROLLBACK.*/COMMIT;/') | sqlite3 " + recovered + "; mv " + recovered + " " + db +
-         " && rm -f " + shell_quoted(wal()) + " " + shell_quoted(dir_ / "anchord.db-shm") +
-         "\n"
-         "  cp \"$(ls -t " +
-         shell_quoted(backups()) + "/*.db | head -1)\" " + db + " && rm -f " + shell_quoted(wal()) + " " +
+         " .dump | sed 's/^ROLLBACK.*/COMMIT;/') | sqlite3 " + recovered + "; sqlite3 " + recovered +
+         " 'SELECT count(*) FROM uwb_range'\n"
+         "  mv " +
+         recovered + " " + db + " && rm -f " + shell_quoted(wal()) + " " +
          shell_quoted(dir_ / "anchord.db-shm");
 }
 

@@ -132,7 +132,7 @@ Result<std::unique_ptr<ServerLease>> ServerLease::take(const std::string& addres
   // One that was killed has its lease to the end; then a new start need not fail.
   const auto patience = SteadyClock::now() + wish.lease + 2 * k_try_every;
   auto line = std::make_unique<Line>(address);
-  std::string named;
+  std::string named, trouble;
   for (;;) {
     try {
       const auto made = line->run([&](PostgresConnection& c) { return attempt(c, wish); });
@@ -146,9 +146,13 @@ Result<std::unique_ptr<ServerLease>> ServerLease::take(const std::string& addres
         return std::unique_ptr<ServerLease>(new ServerLease(std::move(line), std::move(wish), *made.fence));
       }
       if (!wish.standby && SteadyClock::now() > patience) return held_by(made.holder);
-      if (wish.standby && named != made.holder) waits(wish, named = made.holder);
+      if (wish.standby && (named != made.holder || !trouble.empty())) waits(wish, named = made.holder);
+      trouble.clear();
     } catch (const SqlError& error) {
-      if (!wish.standby || named.empty()) return sql::to_error(error);  // else it comes back
+      const auto why = sql::to_error(error);
+      if (!wish.standby || named.empty()) return why;  // else it comes back
+      // Each reason once: it is asked twice a second.
+      if (wish.cannot && trouble != why.message) wish.cannot(trouble = why.message);
     }
     if (wish.stopping && wish.stopping()) return make_error(Errc::canceled, "stopped while it stood by");
     std::this_thread::sleep_for(k_try_every);

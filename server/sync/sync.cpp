@@ -30,7 +30,7 @@ Result<void> check(Run& run, Peer& peer, std::span<const std::string_view> roles
   if (!has.is_array() || std::none_of(has.begin(), has.end(), may))
     return make_error(Errc::invalid_argument, peer.url() + ": the token of " + text_of(me, "name") +
                                                   " does not have the role " + least +
-                                                  ": create one there with 'anchord token create NAME "
+                                                  ": create one there with 'anchord token create --name NAME "
                                                   "--role " +
                                                   least + "'");
   if (member(me, "sites").is_array()) run.whole_servers = false;

@@ -53,7 +53,7 @@ test('hello comes first, with epoch, topics and the time', async () => {
   assert.equal(hello.op, 'hello');
   assert.ok(hello.epoch);
   // With the commit, so that a page sees an upgrade within one version too.
-  const { version, git } = await (await server.fetch('/api/v1/version')).json();
+  const { version, git } = await (await server.fetch('/version')).json();
   assert.equal(hello.server, `anchord ${version}+${git}`);
   assert.ok(hello.topics.includes('ranges') && hello.topics.includes('anchors.estimates'), JSON.stringify(hello));
   assert.ok(Math.abs(hello.t_us / 1000 - Date.now()) < 5000);

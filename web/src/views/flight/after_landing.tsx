@@ -27,31 +27,33 @@ export function AfterLanding({ mission }: { mission: string }) {
   const n = made?.n_anchors ?? 0,
     good = made?.verdicts?.ok ?? 0;
   return (
-    <div class={there ? 'callout info' : 'callout'} role="status" data-testid="after-landing">
-      {there ? (
-        <>
-          <b>The flight is calibrated.</b>{' '}
-          <span class="says">
-            {good} of {n} anchors have a position; nothing is published yet.
-          </span>{' '}
-          {may_publish.value && (
-            <button
-              class="btn small primary"
-              data-testid="review-landed"
-              onClick={() => {
-                publish_open.value = true;
-                location.hash = '#/anchors';
-              }}
-            >
-              Review
-            </button>
-          )}
-        </>
-      ) : (
-        <>
-          <b>Calibrating.</b> All ranges of the flight are being solved together.
-        </>
-      )}
-    </div>
+    <section class="sec-p">
+      <div class={there ? 'callout info' : 'callout'} role="status" data-testid="after-landing">
+        {there ? (
+          <>
+            <b>The flight is calibrated.</b>{' '}
+            <span class="says">
+              {good} of {n} anchors have a position; nothing is published yet.
+            </span>{' '}
+            {may_publish.value && (
+              <button
+                class="btn small primary"
+                data-testid="review-landed"
+                onClick={() => {
+                  publish_open.value = true;
+                  location.hash = '#/anchors';
+                }}
+              >
+                Review
+              </button>
+            )}
+          </>
+        ) : (
+          <>
+            <b>Calibrating.</b> All ranges of the flight are being solved together.
+          </>
+        )}
+      </div>
+    </section>
   );
 }

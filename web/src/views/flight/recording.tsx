@@ -14,19 +14,23 @@ export function Recording({ mission }: { mission: string }) {
   tick.value;
   const m = current_mission.value,
     p = current_scene()?.procedure?.value;
-  if (m?.mission !== mission) return null;
-  if (m.state !== 'recording')
-    return (
-      <section class="sec-p" data-testid="recording">
-        <AfterLanding mission={mission} />
-        {may('operator') && (
-          <a class="btn small" href="#/system/flight" data-testid="next-flight">
-            New flight
-          </a>
-        )}
-      </section>
-    );
-  return !may('operator') || (p && flying(p)) ? null : <Finish key={mission} mission={mission} name={m.name} />;
+  if (m?.mission !== mission || (p && flying(p))) return null;
+  return (
+    <>
+      <AfterLanding mission={mission} />
+      {may('operator') && (
+        <section class="sec-p" data-testid="recording">
+          {m.state === 'recording' ? (
+            <Finish key={mission} mission={mission} name={m.name} />
+          ) : (
+            <a class="btn small" href="#/system/flight" data-testid="next-flight">
+              New flight
+            </a>
+          )}
+        </section>
+      )}
+    </>
+  );
 }
 
 function Finish({ mission, name }: { mission: string; name: string }) {
@@ -42,7 +46,7 @@ function Finish({ mission, name }: { mission: string; name: string }) {
     }
   };
   return (
-    <section class="sec-p" data-testid="recording">
+    <>
       <HoldButton
         testid="finish-recording"
         disabled={link.value === 'lost'}
@@ -52,6 +56,6 @@ function Finish({ mission, name }: { mission: string; name: string }) {
         Finish the recording
       </HoldButton>
       <Problem text={problem} />
-    </section>
+    </>
   );
 }
