@@ -27,7 +27,8 @@ struct LeaseWish {
   std::function<bool()> stopping;  ///< asked while it waits
   /// For each that has it while this one waits: its name, and where it is reached.
   std::function<void(std::string_view other, std::string_view url)> waits;
-  std::function<void(std::string_view why)> cannot;  ///< why it cannot ask for it while it waits, each reason once
+  /// Why it cannot ask for it while it waits, each reason once.
+  std::function<void(std::string_view why)> cannot;
   std::function<void(std::string_view why)> lost;  ///< once, from another thread: it must end now
 };
 
