@@ -1,7 +1,6 @@
 #include "server/runtime/token_file.hpp"
 
 #include <fstream>
-#include <iterator>
 #include <nlohmann/json.hpp>
 
 namespace anchord::server {

@@ -1,13 +1,12 @@
 /// Where the recording of the shown flight is ended, what became of it then, and the way to the next one.
 import { useState } from 'preact/hooks';
 import { error_text } from '../../api/client';
-import { finish_flight } from '../../api/missions';
 import { may } from '../../state/session';
 import { current_mission, current_scene, link, say, tick } from '../../state/store';
 import { Problem } from '../../ui/problem';
 import { AfterLanding } from './after_landing';
+import { finish } from './finish';
 import { HoldButton } from './hold_button';
-import { lease } from './lease';
 import { flying } from './words';
 
 export function Recording({ mission }: { mission: string }) {
@@ -35,11 +34,10 @@ export function Recording({ mission }: { mission: string }) {
 
 function Finish({ mission, name }: { mission: string; name: string }) {
   const [problem, set_problem] = useState('');
-  const finish = async (): Promise<void> => {
-    const held = lease.peek();
+  const confirmed = async (): Promise<void> => {
     set_problem('');
     try {
-      await finish_flight(mission, held?.mission === mission ? held.key : null);
+      await finish(mission);
       say(`${name || 'The flight'} is finished`);
     } catch (e) {
       set_problem(error_text(e));
@@ -51,7 +49,7 @@ function Finish({ mission, name }: { mission: string; name: string }) {
         testid="finish-recording"
         disabled={link.value === 'lost'}
         note="hold 1 s"
-        onConfirm={() => void finish()}
+        onConfirm={() => void confirmed()}
       >
         Finish the recording
       </HoldButton>

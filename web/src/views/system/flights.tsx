@@ -5,7 +5,6 @@ import { error_text } from '../../api/client';
 import {
   delete_flight,
   deleted_flights,
-  finish_flight,
   handover_url,
   restore_flight,
   stored_flights,
@@ -18,7 +17,7 @@ import { Empty } from '../../ui/empty';
 import { date, grouped } from '../../ui/format';
 import { Problem } from '../../ui/problem';
 import { useStable } from '../../ui/use_stable';
-import { lease } from '../flight/lease';
+import { finish } from '../flight/finish';
 import { FlightForm } from './flight_form';
 import { NewFlight } from './new_flight';
 
@@ -61,14 +60,9 @@ export function FlightsPanel({ beginning }: { beginning: boolean }) {
     if (sure !== f.id) set_sure(f.id);
     else void guarded(() => delete_flight(f.id, may()), `${f.name} is in the bin`);
   };
-  const finish = (f: StoredFlight): void => {
-    const held = lease.peek();
+  const end = (f: StoredFlight): void => {
     if (sure !== f.id) set_sure(f.id);
-    else
-      void guarded(
-        () => finish_flight(f.id, held?.mission === f.id ? held.key : null),
-        `${f.name || 'The flight'} is finished`,
-      );
+    else void guarded(() => finish(f.id), `${f.name || 'The flight'} is finished`);
   };
   const restore = (f: StoredFlight): void =>
     void guarded(async () => {
@@ -154,7 +148,7 @@ export function FlightsPanel({ beginning }: { beginning: boolean }) {
                         data-testid="finish-flight"
                         disabled={link.value === 'lost'}
                         aria-label={`${sure === f.id ? 'Press again to finish' : 'Finish'} ${f.name || f.id.slice(-8)}`}
-                        onClick={() => finish(f)}
+                        onClick={() => end(f)}
                       >
                         {sure === f.id ? 'Press again to finish' : 'Finish'}
                       </button>
