@@ -93,7 +93,7 @@ class Connection {
   using Keys = std::vector<std::optional<std::int64_t>>;
   /// Inserts `n` rows. With a key: the key of each, or nothing for one that is left out because there is one
   /// like it, also among these. Without a key: a row that is there already is an error, nothing is answered.
-  /// One statement a row, which is the fastest way in SQLite; a database with round trips has another.
+  /// One statement a row; each database has a faster way for many.
   virtual Keys insert_rows(const BulkTable& table, std::size_t n, const BindRow& bind);
 };
 

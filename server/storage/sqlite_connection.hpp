@@ -27,6 +27,7 @@ class SqliteConnection final : public Connection {
 
   Statement& prepared(std::string_view sql) override;
   void execute(const std::string& sql) override;
+  Keys insert_rows(const BulkTable& table, std::size_t n, const BindRow& bind) override;
 
   std::int64_t pragma(const std::string& name);  ///< the integer it answers
   bool read_only_file();                         ///< opened for writing, but the file did not allow it
@@ -37,6 +38,8 @@ class SqliteConnection final : public Connection {
   sqlite3* handle();
 
  private:
+  bool insert_together(Query& query, const BulkTable& table, std::size_t n, Keys& keys);
+
   struct State;
   std::unique_ptr<State> state_;
 };

@@ -275,6 +275,28 @@ TEST_P(SeamContract, OfManyRowsThoseLikeAnotherAreLeftOut) {
   EXPECT_EQ(query.integer(), 5);
 }
 
+TEST_P(SeamContract, OneLikeAnotherAmongHundredsIsLeftOutAndTheRestHaveTheirKeys) {
+  put("one", 120);
+  connection_->execute("BEGIN");
+  const auto keys = connection_->insert_rows(k_keyed, 205, [](Query& query, std::size_t row) {
+    // 1 to 205, where 120 is there already and 60 comes a second time in place of 61.
+    const auto one = static_cast<std::int64_t>(row == 60 ? 60 : row + 1);
+    query << one << std::nullopt << std::nullopt << std::nullopt << one;
+  });
+  connection_->execute("COMMIT");
+  ASSERT_EQ(keys.size(), 205u);
+  Query query(*connection_, "SELECT one FROM seam WHERE key = ?1");
+  for (std::size_t row = 0; row < keys.size(); ++row) {
+    const bool left_out = row == 60 || row == 119;
+    EXPECT_EQ(keys[row].has_value(), !left_out) << row;
+    if (!keys[row]) continue;
+    query.again();
+    query << *keys[row];
+    ASSERT_TRUE(query.step()) << row;
+    EXPECT_EQ(query.integer(), static_cast<std::int64_t>(row + 1));
+  }
+}
+
 TEST_P(SeamContract, ManyRowsThatTheSchemaRefusesAreAnError) {
   const auto insert = [&](const BulkTable& table, std::int64_t one) {
     connection_->execute("BEGIN");
