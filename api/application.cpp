@@ -28,8 +28,8 @@ WsHandlerFactory Application::ws_factory() {
 }
 
 TokenWsFactory Application::omlox_ws_factory() {
-  return [this](std::function<bool()> holds, TokenDoor door) {
-    return std::make_unique<OmloxConversation>(state_->hub, state_->omlox_locations, std::move(holds),
+  return [this](Listener first, TokenDoor door) {
+    return std::make_unique<OmloxConversation>(state_->hub, state_->omlox_locations, std::move(first),
                                                std::move(door));
   };
 }

@@ -75,6 +75,7 @@ void Application::State::second() {
     pulse.unrecorded = deps.devices.recorder_failure();
     pulse.not_started = deps.devices.not_started();
   });
+  (void)guarded("backups", [&] { pulse.not_backed_up = deps.backups.state().failure; });
   std::vector<FlightPulse> pulses;
   (void)guarded("mission states", [&] { pulses = missions.pulses(); });
   std::vector<std::pair<std::string_view, std::string>> of_flight;

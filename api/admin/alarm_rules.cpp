@@ -103,6 +103,11 @@ std::vector<AlarmCondition> alarm_conditions(const std::vector<FlightPulse>& fli
     out.push_back({"clock.skew", AlarmPriority::warning, server.clock_skew, {}});
   if (!server.not_started.empty())
     out.push_back({"device.not_started", AlarmPriority::warning, server.not_started, {}});
+  if (!server.not_backed_up.empty())
+    out.push_back({"backup.failed",
+                   AlarmPriority::warning,
+                   "the last backup failed, and the next attempt follows: " + server.not_backed_up,
+                   {}});
   if (!server.unrecorded.empty()) {
     out.push_back({"recording.failed",
                    AlarmPriority::critical,

@@ -41,6 +41,7 @@ struct ServerPulse {
   std::string clock_skew{};         ///< the system clock against the receiver's, in words; empty: right
   std::string failed_tasks{};       ///< of the server, with what they threw; empty: none lately
   std::string not_started{};        ///< devices that are kept but do not run, and why; empty: all do
+  std::string not_backed_up{};      ///< why the last backup failed; empty: it did not
   std::string unrecorded{};         ///< why raw bytes of the devices are not recorded; empty: they are
 };
 

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <map>
 #include <nlohmann/json.hpp>
 
@@ -14,6 +15,7 @@
 #include "api/stream/hub.hpp"
 #include "core/base/time.hpp"
 #include "core/ports/access_store.hpp"
+#include "core/ports/backups.hpp"
 
 namespace anchord::api {
 
@@ -95,6 +97,18 @@ Response metrics(AdminApi& s, const Request&) {
       "Missions removed from memory to make room for another one");
   add("anchord_db_size_bytes", "gauge", storage.db_bytes, "Size of the database");
   add("anchord_disk_free_bytes", "gauge", storage.disk_free_bytes, "Free space where the database is");
+  if (storage.stood_by)
+    add("anchord_standby_waiting", "gauge", *storage.stood_by ? 1 : 0,
+        "1 while another server waits to take over");
+  if (!s.backups.refusal()) {
+    const BackupState backups = s.backups.state();
+    add("anchord_backup_failed", "gauge", backups.failure.empty() ? 0 : 1,
+        "1 while the last attempt made no backup");
+    if (backups.newest)
+      add("anchord_backup_newest_timestamp_seconds", "gauge",
+          static_cast<std::uint64_t>(std::max<std::int64_t>(0, backups.newest->us() / 1'000'000)),
+          "When the newest backup was made, by the server's clock");
+  }
   text += s.metrics_text();
   Response response;
   response.header("Content-Type", "text/plain; version=0.0.4; charset=utf-8");

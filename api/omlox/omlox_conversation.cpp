@@ -31,9 +31,9 @@ std::string text_of(const Json& message, const char* key) {
 
 }  // namespace
 
-OmloxConversation::OmloxConversation(Hub& hub, const OmloxLocations& locations, std::function<bool()> holds,
+OmloxConversation::OmloxConversation(Hub& hub, const OmloxLocations& locations, Listener first,
                                      TokenDoor door)
-    : hub_(hub), locations_(locations), door_(std::move(door)), holds_(std::in_place, std::move(holds)) {}
+    : hub_(hub), locations_(locations), door_(std::move(door)), listener_(std::in_place, std::move(first)) {}
 
 OmloxConversation::~OmloxConversation() = default;
 
@@ -72,10 +72,15 @@ bool OmloxConversation::let_in(const Json& message) {
   const auto params = message.find("params");
   const auto token = params != message.end() && params->is_object() ? text_of(*params, "token") : "";
   if (!token.empty()) {
-    auto holds = door_ ? door_(token) : std::function<bool()>{};
-    if (holds) {
-      auto known = holds_.lock();
-      *known = std::move(holds);
+    Listener in = door_ ? door_(token) : Listener{};
+    if (in.holds) {
+      {
+        auto listener = listener_.lock();
+        *listener = std::move(in);
+      }
+      // What came for the token before may be of a site that this one does not see.
+      auto output = output_.lock();
+      output->poses.clear();
       return true;
     }
     refuse(k_not_authorized, "the token is unknown, expired or revoked, or may not read");
@@ -83,8 +88,8 @@ bool OmloxConversation::let_in(const Json& message) {
     return false;
   }
   {
-    const auto known = holds_.lock();
-    if (*known && (*known)()) return true;
+    const auto listener = listener_.lock();
+    if (listener->holds && listener->holds()) return true;
   }
   refuse(k_not_authorized, "send a token in params.token");
   return false;
@@ -178,10 +183,16 @@ void OmloxConversation::close(std::uint16_t code, std::string_view reason) {
 }
 
 void OmloxConversation::on_message(Topic, const std::shared_ptr<const LiveMessage>& message) {
+  SiteSet sites;
+  {
+    const auto listener = listener_.lock();
+    sites = listener->sites;
+  }
   {
     auto output = output_.lock();
     if (output->close) return;
-    for (const auto& element : message->elements) output->poses[element.key] = element.json;
+    for (const auto& element : message->elements)
+      if (sites.holds(element.site)) output->poses[element.key] = element.json;
   }
   if (wake_) wake_();
 }
@@ -190,9 +201,9 @@ void OmloxConversation::on_tick(UtcTime, bool) {
   bool stranger = false, stands = true;
   const bool ask = ++ticks_ % 5 == 0;  // four times a second, as other live connections
   {
-    const auto holds = holds_.lock();
-    stranger = !*holds;
-    if (!stranger && ask) stands = (*holds)();
+    const auto listener = listener_.lock();
+    stranger = !listener->holds;
+    if (!stranger && ask) stands = listener->holds();
   }
   if (stranger && ticks_ > k_stranger_ticks) return close(4001, "auth: no token was received");
   if (!stands) return close(4001, "auth");

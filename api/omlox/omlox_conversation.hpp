@@ -20,7 +20,7 @@ struct OmloxLocation;
 
 /// The WebSocket of an omlox hub, to one client: subscribe and unsubscribe in; subscribed, unsubscribed,
 /// message and error out. Topics location_updates and location_updates:geojson; a client that is slow gets
-/// the newest of each flight. Who has not come in by a token within k_stranger_ticks is let go.
+/// the newest of each flight, of the flights that its token may see. Who has not come in by a token within k_stranger_ticks is let go.
 class OmloxConversation final : public WsHandler, private HubListener {
  public:
   static constexpr std::size_t k_max_subscriptions = 32;
@@ -28,7 +28,7 @@ class OmloxConversation final : public WsHandler, private HubListener {
   static constexpr unsigned k_stranger_ticks = 200;   ///< of 50 ms
   static constexpr unsigned k_most_wrong_tokens = 3;  ///< then closed
 
-  OmloxConversation(Hub& hub, const OmloxLocations& locations, std::function<bool()> holds, TokenDoor door);
+  OmloxConversation(Hub& hub, const OmloxLocations& locations, Listener first, TokenDoor door);
   ~OmloxConversation() override;
 
   void on_open(std::function<void()> wake) override;
@@ -69,7 +69,7 @@ class OmloxConversation final : public WsHandler, private HubListener {
   const OmloxLocations& locations_;
   const TokenDoor door_;
   std::function<void()> wake_;
-  Locked<std::function<bool()>> holds_;  ///< empty: nobody has come in
+  Locked<Listener> listener_;
   Locked<Output> output_;  ///< taken inside the hub's lock, so never held while the hub is called
   // Touched by the session's strand alone.
   std::map<std::uint64_t, Wanted> subscriptions_;

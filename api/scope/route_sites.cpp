@@ -241,7 +241,7 @@ constexpr auto k_routes = std::to_array<RouteSites>({
     {get, "/omlox/v2/trackables/{id}", stored},
     {get, "/omlox/v2/trackables/{id}/location", stored},
     {get, "/omlox/v2/trackables/{id}/locations", stored},
-    {get, "/omlox/v2/ws/socket", refused},
+    {get, "/omlox/v2/ws/socket", open},
     {get, "/healthz", open},
     {get, "/readyz", open},
     {get, "/version", open},

@@ -32,10 +32,14 @@ class WsHandler {
 using WsHandlerFactory =
     std::function<std::unique_ptr<WsHandler>(const Principal&, std::function<bool()> holds)>;
 
-/// Lets in by a token that came in a message: whether that login still stands, as `holds` above. Empty: the
-/// token is not known, or may not listen.
-using TokenDoor = std::function<std::function<bool()>(std::string_view token)>;
-/// Of a protocol whose clients send their token in a message: nobody has come in yet where `holds` is empty.
-using TokenWsFactory = std::function<std::unique_ptr<WsHandler>(std::function<bool()> holds, TokenDoor door)>;
+/// Who came in: whether that login still stands, as above, and what it may see. `holds` empty: nobody.
+struct Listener {
+  std::function<bool()> holds{};
+  SiteSet sites{};
+};
+/// Lets in by a token that came in a message; nobody where it is not known, or may not listen.
+using TokenDoor = std::function<Listener(std::string_view token)>;
+/// Of a protocol whose clients send their token in a message: `first` is who came in by the handshake.
+using TokenWsFactory = std::function<std::unique_ptr<WsHandler>(Listener first, TokenDoor door)>;
 
 }  // namespace anchord::api

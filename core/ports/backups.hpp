@@ -24,6 +24,12 @@ struct Backup {
   std::vector<std::string> cir_missing{};  ///< those that it needs and has not, with the reason; empty: whole
 };
 
+/// How the copies go, without a look at the disk.
+struct BackupState {
+  std::optional<UtcTime> newest{};  ///< when the newest was made, by the system clock; absent: none is known
+  std::string failure{};            ///< why the last attempt made none; empty: it made one
+};
+
 /// Copies of the database on disk. Thread-safe.
 class Backups {
  public:
@@ -34,6 +40,7 @@ class Backups {
   /// Errors: storage_full, storage_unavailable, conflict (one is being made), canceled.
   virtual Result<Backup> make(const std::function<bool()>& go_on) = 0;
   virtual std::vector<Backup> list() const = 0;  ///< newest first, by sequence
+  virtual BackupState state() const = 0;
   /// Whether one is to be begun now: the newest is older than the schedule wants, or a flight ended since the
   /// last was begun (`flights_ended` only grows). Never while the schedule is off, at most each ten minutes.
   virtual bool due(std::uint64_t flights_ended) = 0;

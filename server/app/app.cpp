@@ -150,6 +150,7 @@ api::StorageStatus status_of(Database& database) {
   status.disk_free_bytes = health.disk_free_bytes;
   status.queue_depth = health.queued_rows;
   status.synchronous = to_string(health.synchronous);
+  status.stood_by = health.stood_by;
   return status;
 }
 

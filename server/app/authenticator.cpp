@@ -216,9 +216,6 @@ bool may_watch(const api::Principal& who) {
   return api::Access::any_of({viewer, integrator, engineer, op}).permits(who);
 }
 
-/// Locations are of every flight there is.
-bool may_watch_omlox(const api::Principal& who) { return may_watch(who) && who.sites.all(); }
-
 /// To a plain GET of a WebSocket's address.
 api::Response upgrade_needed(const char* type, const char* detail) {
   auto response = api::problem(426, type, detail);
@@ -266,22 +263,22 @@ std::function<bool()> Authenticator::standing(const api::Login& login, std::shar
   return [this, login, place = std::move(place)] { return access_.holds(login); };
 }
 
-/// By a token that came in a message; empty: it is not let in.
-std::function<bool()> Authenticator::let_in(const api::Request& request, std::string_view token) {
-  if (access_.options().auth_off) return [] { return true; };
+/// By a token that came in a message; nobody: it is not let in.
+api::Listener Authenticator::let_in(const api::Request& request, std::string_view token) {
+  if (access_.options().auth_off) return {[] { return true; }, {}};
   const auto who = access_.verify(token);
   if (!who) {
     access_.note_refusal("nobody", k_unknown_token, request.remote);
     (void)access_.guard().failed(token, request.remote, api::LoginGuard::Clock::now());
     return {};
   }
-  if (!may_watch_omlox(*who)) {
+  if (!may_watch(*who)) {
     access_.note_refusal(who->token_id, "GET " + std::string(k_omlox_path), request.remote);
     return {};
   }
   auto place = places_.take(*who, true);
   if (std::holds_alternative<WsPlaces::Refusal>(place)) return {};
-  return standing({*who, {}}, std::get<std::shared_ptr<void>>(std::move(place)));
+  return {standing({*who, {}}, std::get<std::shared_ptr<void>>(std::move(place))), who->sites};
 }
 
 /// Its clients send no header: the connection is made, and the token comes in a message.
@@ -290,10 +287,9 @@ Admission Authenticator::live_omlox(const api::Request& request, bool websocket,
   const api::Principal& who = request.principal;
   if (!websocket && who.roles.empty())
     return refused(problem(401, "unauthorized", "send a token in the header Authorization: Bearer"), route);
-  if (!who.roles.empty() && !may_watch_omlox(who)) {
+  if (!who.roles.empty() && !may_watch(who)) {
     access_.note_refusal(who.token_id, "GET " + route, request.remote);
-    return refused(problem(403, "forbidden", "live locations need the role viewer and a token of every site"),
-                   route);
+    return refused(problem(403, "forbidden", "live locations need the role viewer"), route);
   }
   if (!websocket) return refused(upgrade_needed("method", "this is a WebSocket: ask for an upgrade"), route);
   Admission admission;
@@ -311,14 +307,14 @@ Admission Authenticator::live_omlox(const api::Request& request, bool websocket,
   api::Request from;
   from.remote = request.remote;
   auto door = [this, first, from](std::string_view token) {
-    auto holds = let_in(from, token);
-    if (holds && !access_.options().auth_off) first->reset();
-    return holds;
+    auto in = let_in(from, token);
+    if (in.holds && !access_.options().auth_off) first->reset();
+    return in;
   };
-  std::function<bool()> holds;
-  if (!stranger) holds = standing(login.who.token_id.empty() ? api::Login{who, {}} : login, *first);
-  admission.websocket = [this, door = std::move(door), holds = std::move(holds)] {
-    return make_live_peer(omlox_(holds, door), nullptr);
+  api::Listener in;
+  if (!stranger) in = {standing(login.who.token_id.empty() ? api::Login{who, {}} : login, *first), who.sites};
+  admission.websocket = [this, door = std::move(door), in = std::move(in)] {
+    return make_live_peer(omlox_(in, door), nullptr);
   };
   return admission;
 }

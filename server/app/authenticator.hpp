@@ -54,7 +54,7 @@ class Authenticator final : public Gateway {
   std::function<bool()> standing(const api::Login& login, std::shared_ptr<void> place);
   /// Longer than it should have taken: not where the client asked to wait.
   bool is_slow(const api::Request& request, double seconds) const;
-  std::function<bool()> let_in(const api::Request& request, std::string_view token);
+  api::Listener let_in(const api::Request& request, std::string_view token);
   Admission at_once(Admission admission, const api::Route& route, api::Response& answer);
   Admission decide(api::Request& request, std::string_view host, bool websocket);
   api::Response run(const api::Route& route, api::Request& request, const api::Login& login);

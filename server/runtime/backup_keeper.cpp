@@ -57,7 +57,12 @@ std::optional<std::pair<std::uint64_t, UtcTime>> read_name(const std::string& na
 }  // namespace
 
 BackupKeeper::BackupKeeper(Database& database, const Clock& clock, Options options)
-    : database_(database), clock_(clock), options_(std::move(options)) {}
+    : database_(database), clock_(clock), options_(std::move(options)) {
+  const auto all = list();
+  if (all.empty()) return;
+  auto state = state_.lock();
+  state->newest = all.front().made;
+}
 
 SteadyTime BackupKeeper::steady_now() const { return options_.steady->now(); }
 
@@ -131,6 +136,18 @@ void BackupKeeper::drop_old() {
 Result<Backup> BackupKeeper::make(const std::function<bool()>& go_on) {
   const std::unique_lock lock(making_, std::try_to_lock);
   if (!lock) return make_error(Errc::conflict, "a backup is already being made");
+  auto made = copy_now(go_on);
+  auto state = state_.lock();
+  if (made) {
+    state->newest = made.value().made;
+    state->failure.clear();
+  } else if (made.error().code != Errc::canceled) {
+    state->failure = made.error().message;
+  }
+  return made;
+}
+
+Result<Backup> BackupKeeper::copy_now(const std::function<bool()>& go_on) {
   std::error_code error;
   fs::create_directories(options_.dir, error);
   if (error) return make_error(Errc::storage_unavailable, options_.dir.string() + ": " + error.message());

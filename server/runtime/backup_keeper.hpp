@@ -34,6 +34,7 @@ class BackupKeeper final : public Backups {
   BackupKeeper(Database& database, const Clock& clock, Options options);
   Result<Backup> make(const std::function<bool()>& go_on) override;
   std::vector<Backup> list() const override;
+  BackupState state() const override { return state_.copy(); }
   bool due(std::uint64_t flights_ended) override;
 
  private:
@@ -49,6 +50,7 @@ class BackupKeeper final : public Backups {
     SteadyTime not_before{};
     std::uint64_t flights_saved{0};
   };
+  Result<Backup> copy_now(const std::function<bool()>& go_on);
   SteadyTime steady_now() const;
   SteadyTime first_look(SteadyTime now) const;
   bool whole(const Backup& backup);
@@ -61,6 +63,7 @@ class BackupKeeper final : public Backups {
   std::mutex making_;  ///< one backup at a time; taken before the others
   Locked<std::map<std::string, Checked>> checked_;
   Locked<Due> due_;
+  Locked<BackupState> state_;
 };
 
 /// Of a database that is copied by programs of its own: makes none, and says so.
@@ -69,6 +72,7 @@ class NoBackups final : public Backups {
   explicit NoBackups(std::string why) : why_(std::move(why)) {}
   Result<Backup> make(const std::function<bool()>&) override { return *refusal(); }
   std::vector<Backup> list() const override { return {}; }
+  BackupState state() const override { return {}; }
   bool due(std::uint64_t) override { return false; }
   std::optional<Error> refusal() const override { return make_error(Errc::unsupported, why_); }
 

@@ -73,6 +73,7 @@ class PostgresDatabase final : public Database {
     health.schema_version = newest_schema_version();
     health.db_bytes = seen_.copy().bytes;
     health.disk_free_bytes = folder_->free_bytes();
+    if (lease_) health.stood_by = lease_->stood_by();
     if (status.trouble) {
       health.level =
           status.trouble->failure() == sql::Failure::full ? StorageLevel::full : StorageLevel::unavailable;

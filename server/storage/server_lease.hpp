@@ -49,6 +49,11 @@ class ServerLease {
   ServerLease& operator=(const ServerLease&) = delete;
 
   std::int64_t fence() const { return fence_; }
+  /// Whether another server was heard of in the last 30 s that waits to take over.
+  bool stood_by() const {
+    const auto held = held_.lock();
+    return held->stood_by;
+  }
 
  private:
   class Line;

@@ -64,6 +64,7 @@ struct StorageHealth {
   std::uint64_t commits{}, rows_written{};
   double last_commit_s{};
   int schema_version{};
+  std::optional<bool> stood_by{};  ///< another server waits to take over; nothing where none ever can
   Synchronous synchronous{Synchronous::full};
 };
 

@@ -304,6 +304,14 @@ TEST(AlarmRules, NameTheDevicesThatAreKeptAndDoNotRun) {
   EXPECT_EQ(raised(well(), server), "server.task_failed device.not_started");
 }
 
+TEST(AlarmRules, SayWhyTheLastBackupFailed) {
+  const auto found = api::alarm_conditions({}, {.not_backed_up = "the disk of /backups is full"});
+  ASSERT_EQ(found.size(), 1u);
+  EXPECT_EQ(found[0].id, "backup.failed");
+  EXPECT_EQ(found[0].priority, api::AlarmPriority::warning);
+  EXPECT_NE(found[0].text.find("the disk of /backups is full"), std::string::npos) << found[0].text;
+}
+
 TEST_F(Alarms, AreServedAndAcknowledgedByOperatorsOnly) {
   EXPECT_TRUE(json(get("/api/v1/alarms"))["items"].empty());
   EXPECT_EQ(post("/api/v1/alarms/rtk.lost/ack", "").status, 404);

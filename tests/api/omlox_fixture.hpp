@@ -71,11 +71,14 @@ class OmloxFixture : public AppFixture {
     ASSERT_EQ(fitted.status, 200) << fitted.body;
   }
   /// A flight with tag 0x6e01 of kit-1; its id.
-  std::string flight() {
-    const auto made =
-        post("/api/v1/missions",
-             R"({"name":"f","kit":"kit-1","frame":"wgs84",)"
-             R"("track_point":"gnss_antenna","tags":[{"tag":"0x6e01","lever_arm_body_m":[0,0,-0.5]}]})");
+  std::string flight(const std::optional<std::string>& site = {}) {
+    Json wanted{{"name", "f"},
+                {"kit", "kit-1"},
+                {"frame", "wgs84"},
+                {"track_point", "gnss_antenna"},
+                {"tags", {{{"tag", "0x6e01"}, {"lever_arm_body_m", {0, 0, -0.5}}}}}};
+    if (site) wanted["site"] = *site;
+    const auto made = post("/api/v1/missions", wanted.dump());
     EXPECT_EQ(made.status, 201) << made.body;
     return json(made)["id"];
   }
@@ -94,7 +97,7 @@ class OmloxFixture : public AppFixture {
                              {"tag_enu_m", {0, 0, 5.9}},
                              {"speed_mps", 1.2}}
                             .dump(),
-                        1777889472345678, flight);
+                        1777889472345678, flight, {}, MissionId{parse_uuid(flight).value()});
   }
   const std::vector<Eigen::Vector3d> square_{{0, 0, 3}, {10, 0, 3}, {0, 8, 3}, {10, 8, 3.5}};
 };

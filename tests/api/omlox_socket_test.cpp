@@ -1,4 +1,6 @@
 // The WebSocket of an omlox hub: wrapper objects and codes as chapter 13 of hub API 2.0.0 has them.
+#include <set>
+
 #include "omlox_fixture.hpp"
 
 namespace anchord::test::omlox_socket_test {
@@ -6,10 +8,14 @@ namespace {
 
 class OmloxSocket : public OmloxFixture {
  protected:
+  /// Token "good" sees all, "of a site" what is of site_.
   std::unique_ptr<api::WsHandler> connect(std::function<bool()> holds = {}) {
-    auto client = app_->omlox_ws_factory()(std::move(holds), [this](std::string_view token) {
-      return token == "good" ? std::function<bool()>([this] { return holds_.load(); })
-                             : std::function<bool()>{};
+    auto client = app_->omlox_ws_factory()({std::move(holds), {}}, [this](std::string_view token) {
+      const auto stands = [this] { return holds_.load(); };
+      if (token == "good") return api::Listener{stands, {}};
+      if (token == "of a site")
+        return api::Listener{stands, SiteSet::only({SiteId{parse_uuid(site_).value()}})};
+      return api::Listener{};
     });
     client->on_open([] {});
     return client;
@@ -32,6 +38,7 @@ class OmloxSocket : public OmloxFixture {
   /// The flight is known once it was looked up: here by the REST face.
   void known() { get("/omlox/v2/providers/locations"); }
   std::atomic<bool> holds_{true};
+  std::string site_;
 };
 
 TEST_F(OmloxSocket, ASubscriptionGetsLocationsUntilItEnds) {
@@ -147,6 +154,41 @@ TEST_F(OmloxSocket, NobodyListensWithoutATokenThatHolds) {
   ASSERT_TRUE(client->close_request());
   EXPECT_EQ(client->close_request()->first, 4001);
   client->on_close();
+}
+
+TEST_F(OmloxSocket, ATokenOfASiteGetsTheFlightsOfThatSiteAlone) {
+  site_ = hall(square_);
+  const auto ours = flight(site_), of_nobody = flight();
+  const auto others =
+      flight(json(post("/api/v1/sites", R"({"name":"next door","origin":{"lon":4,"lat":51,"h_m":0}})"))["id"]
+                 .get<std::string>());
+  const auto fly_all = [&] {
+    for (const auto& id : {others, ours, of_nobody}) fly(id);
+  };
+  fly_all();
+  known();
+  auto bound = connect(), all = connect();
+  Json of_site = subscribe("location_updates");
+  of_site["params"]["token"] = "of a site";
+  bound->on_text(of_site.dump());  // what is newest of its site comes at once
+  ask(*all, subscribe("location_updates"));
+  fly_all();
+  const auto missions_seen = [](api::WsHandler& client) {
+    std::set<std::string> out;
+    for (const auto& message : read(client))
+      for (const auto& location : message.value("payload", Json::array()))
+        out.insert(location["properties"]["anchord"]["mission"]);
+    return out;
+  };
+  EXPECT_EQ(missions_seen(*bound), (std::set<std::string>{ours}));
+  EXPECT_EQ(missions_seen(*all), (std::set<std::string>{ours, others, of_nobody}));
+  // One that had come in for all, and now comes in for its site.
+  fly_all();
+  all->on_text(of_site.dump());
+  EXPECT_EQ(missions_seen(*all), (std::set<std::string>{}));
+  fly_all();
+  EXPECT_EQ(missions_seen(*all), (std::set<std::string>{ours}));
+  for (auto* one : {bound.get(), all.get()}) one->on_close();
 }
 
 TEST_F(OmloxSocket, StrangersAndGuessersAreLetGo) {

@@ -37,6 +37,7 @@ struct NoBackups final : Backups {
     return make_error(Errc::storage_unavailable, "none here");
   }
   std::vector<Backup> list() const override { return {}; }
+  BackupState state() const override { return {}; }
   bool due(std::uint64_t) override { return false; }
 };
 

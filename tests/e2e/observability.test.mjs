@@ -6,6 +6,8 @@ import { request } from 'node:http';
 import { join } from 'node:path';
 import { after, before, test } from 'node:test';
 import { promisify } from 'node:util';
+import { Feeder, GatewayProcess } from './gateway.mjs';
+import { startPostgres } from './postgres.mjs';
 import { eventually, root, startServer } from './server.mjs';
 
 const monitoring = join(root, 'docs/monitoring');
@@ -41,8 +43,50 @@ test('promtool takes the rules, and each fires when it should', async () => {
   assert.match((await promtool(['check', 'config', file])).stdout, /SUCCESS/);
 });
 
-test('every metric of the rules and the board is one of the server', () => {
-  const served = new Set([...metrics.matchAll(/^# TYPE (\S+) (\S+)/gm)].map((m) => m[1]));
+/** What a gateway whose server is gone says of itself. */
+async function gatewayMetrics() {
+  const feeder = await new Feeder().start();
+  const gateway = new GatewayProcess({ to: 'http://127.0.0.1:1', token: null, feeder });
+  try {
+    await gateway.start();
+    return await (await fetch(`${gateway.url}/metrics`)).text();
+  } finally {
+    feeder.close();
+    await gateway.dispose();
+  }
+}
+
+/** What a server on PostgreSQL has besides: another one may wait for it. */
+async function clusterMetrics() {
+  const postgres = await startPostgres();
+  try {
+    await postgres.psql('CREATE DATABASE anchord');
+    const holder = await startServer({ args: ['--database', postgres.url('anchord')], env: postgres.env });
+    try {
+      return await (await holder.fetch('/metrics')).text();
+    } finally {
+      await holder.dispose();
+    }
+  } finally {
+    await postgres.dispose();
+  }
+}
+
+test('every metric of the rules and the board is one of a server or a gateway', async () => {
+  assert.equal((await server.fetch('/api/v1/backups', { method: 'POST', headers: { prefer: 'wait=10' } })).status, 201);
+  const backedUp = await (await server.fetch('/metrics')).text();
+  assert.match(backedUp, /^anchord_backup_failed 0$/m);
+  assert.doesNotMatch(backedUp, /anchord_standby_waiting/);
+  const [gateway, cluster] = [await gatewayMetrics(), await clusterMetrics()];
+  assert.match(gateway, /^anchord_gateway_link_up 0$/m);
+  assert.match(cluster, /^anchord_standby_waiting 0$/m);
+  assert.doesNotMatch(cluster, /anchord_backup_failed/);
+  for (const text of [backedUp, gateway, cluster]) {
+    const { stdout, stderr } = await promtool(['check', 'metrics'], text);
+    assert.equal(stdout + stderr, '');
+  }
+  const everything = backedUp + gateway + cluster;
+  const served = new Set([...everything.matchAll(/^# TYPE (\S+) (\S+)/gm)].map((m) => m[1]));
   const named = (text) =>
     [...text.matchAll(/\banchord_[a-z0-9_]+/g)].map((m) => m[0].replace(/_(bucket|sum|count)$/, ''));
   const board = readFileSync(join(monitoring, 'grafana/anchord.json'), 'utf8');

@@ -107,6 +107,11 @@ async function change_places(ended) {
   await found();
 }
 
+test('the metrics of the one that has the database say whether another waits', async () => {
+  const waits = async () => /^anchord_standby_waiting 1$/m.test(await (await holder.fetch('/metrics')).text());
+  await eventually('the holder has heard of it', waits);
+});
+
 test('a second server that does not stand by is refused with what to do, and the first one goes on', async () => {
   const second = await run(
     ['serve', '--listen', '127.0.0.1:0', '--data-dir', join(folder, 'second'), '--database', postgres.url('anchord')],

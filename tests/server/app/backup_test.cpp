@@ -161,6 +161,28 @@ TEST_F(BackupFiles, AreDueEachDayAndAfterEveryFlightButNotAllTheTime) {
   EXPECT_FALSE(off.due(9));
 }
 
+TEST_F(BackupFiles, TellWhenTheNewestWasMadeAndWhyTheLastAttemptFailed) {
+  auto backups = keeper();
+  EXPECT_FALSE(backups.state().newest);
+  ASSERT_TRUE(backups.make(k_on));
+  const UtcTime first = clock_.now();
+  clock_.pass_h(30);
+  // A file where the folder was: no backup can be written there, as on a disk that is gone.
+  const auto aside = dir_.path() / "aside";
+  std::filesystem::rename(copies(), aside);
+  std::ofstream(copies()) << "not a folder";
+  const auto refused = backups.make(k_on);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(backups.state().failure, refused.error().message);
+  EXPECT_EQ(backups.state().newest, first);
+  std::filesystem::remove(copies());
+  std::filesystem::rename(aside, copies());
+  ASSERT_TRUE(backups.make(k_on));
+  EXPECT_EQ(backups.state().failure, "");
+  EXPECT_EQ(backups.state().newest, clock_.now());
+  EXPECT_EQ(keeper().state().newest, clock_.now()) << "a server that starts again looks into the folder";
+}
+
 TEST_F(BackupFiles, ArePutBackWithWhatStoodThereKept) {
   const auto before = mission("in the backup");
   const auto made = keeper().make(k_on);

@@ -209,6 +209,28 @@ TEST_F(PostgresLease, AnOlderProgramThatWaitsEndsWhenANewerOneChangesTheTables) 
   EXPECT_EQ(refused.error().code, Errc::unsupported);
 }
 
+TEST_F(PostgresLease, TellsItsHolderWhetherAnotherServerWaits) {
+  ASSERT_NO_FATAL_FAILURE(migrate_to(newest()));
+  const auto opened = opened_or_told(open(wish("first", newest(), false)));
+  ASSERT_NE(opened, nullptr);
+  const auto stood_by = [&] { return opened->health().stood_by; };
+  EXPECT_EQ(stood_by(), std::optional(false));
+  const auto told = [&](bool wanted) {
+    for (int i = 0; i < 400 && stood_by() != std::optional(wanted); ++i)
+      std::this_thread::sleep_for(milliseconds(50));
+    return stood_by() == std::optional(wanted);
+  };
+  {
+    Waiting<ServerLease> waiting([this](const LeaseWish& w) { return ServerLease::take(address(), w); },
+                                 wish("second", newest(), true));
+    ASSERT_TRUE(waiting.stands_by());
+    EXPECT_TRUE(told(true));
+  }
+  // Its mark is as old as if it had been silent for 40 s.
+  PostgresConnection(address()).execute("UPDATE server_lease SET standby_t_ns = now_ns() - 40000000000");
+  EXPECT_TRUE(told(false));
+}
+
 TEST_F(PostgresLease, IsKeptWhileTheTablesChangeForLongerThanItLasts) {
   constexpr milliseconds k_lease{500};
   // What a large table takes: the step cannot be recorded before this is over.
