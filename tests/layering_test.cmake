@@ -157,6 +157,7 @@ set(mutexes
   api/missions/mission_service_state.hpp:correcting_one  # what was declared of a mission, read and written
   api/missions/mission_service_state.hpp:reading_one  # a flight read back from the store
   api/webhooks/webhook_service.hpp:starting_      # the threads of webhooks: begun or joined
+  server/gateway/outbox.cpp:writing               # the outbox, with what a full disk owes
   server/runtime/backup_keeper.hpp:making_        # a backup
   server/runtime/device_manager.cpp:saving_       # devices.json
   server/runtime/worker_main.cpp:writing          # a frame to the server

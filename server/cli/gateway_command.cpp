@@ -155,6 +155,8 @@ void add_gateway_command(CLI::App& app, int& exit_code) {
       ->add_option("--max-mib", o.max_mib,
                    "largest size of the outbox in MiB; when it is full, no new rows are added [4096]")
       ->check(CLI::Range(1, 1 << 20));
+  command->add_flag("--new-outbox", o.gateway.new_outbox,
+                    "make a new outbox where the one of this folder is missing or empty");
   command
       ->add_option("--recordings-max-mib", o.recordings_max_mib,
                    "largest size of the raw recordings in MiB; beyond it the oldest are deleted [8192]")

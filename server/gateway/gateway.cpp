@@ -31,17 +31,17 @@ class KeptRows final : public DeviceRows {
   KeptRows(Outbox& outbox, Sender& sender) : outbox_(outbox), sender_(sender) {}
   void live(const DeviceBatch&) override {}  // no flight is followed here
   Result<void> store(const DeviceBatch& batch) override {
-    auto kept = outbox_.keep(batches_of(batch));
-    (void)failure_.exchange(kept ? std::string() : kept.error().message);
+    auto batches = batches_of(batch);
+    auto kept = outbox_.keep(batches);
+    // The server can have them all the same.
+    if (!kept && outbox_.hold(std::move(batches))) kept = boost::outcome_v2::success();
     if (kept) sender_.rows_came();
     return kept;
   }
-  std::string failure() const { return failure_.copy(); }
 
  private:
   Outbox& outbox_;
   Sender& sender_;
-  Locked<std::string> failure_;
 };
 
 /// The oldest parts of recordings go until the folder has room again; never the newest, which is being
@@ -107,7 +107,7 @@ class StatusPages final : public server::Gateway {
     if (path == "/metrics")
       return answer(200, "text/plain; version=0.0.4", metrics_text(status) + device_metrics_());
     if (path == "/status") return answer(200, "application/json", status_json(status));
-    return answer(status.keep_failure.empty() ? 200 : 503, "application/json", ready_json(status));
+    return answer(status.outbox.trouble.empty() ? 200 : 503, "application/json", ready_json(status));
   }
   std::function<Status()> status_;
   std::function<std::string()> device_metrics_;
@@ -146,7 +146,6 @@ struct FieldGateway::State {
     out.devices = devices->devices();
     out.recorder_failure = devices->recorder_failure();
     out.not_started = devices->not_started();
-    out.keep_failure = rows->failure();
     out.rows_dropped = devices->rows_lost();
     out.rejected_file = (options.data_dir / "rejected.ndjson").string();
     return out;
@@ -157,7 +156,7 @@ struct FieldGateway::State {
 };
 
 Result<void> FieldGateway::State::make() {
-  BOOST_OUTCOME_TRY(outbox, Outbox::open(options.data_dir, options.max_bytes));
+  BOOST_OUTCOME_TRY(outbox, Outbox::open(options.data_dir, options.max_bytes, options.new_outbox));
   server::DeviceManagerOptions device_options;
   device_options.data_dir = options.data_dir;
   device_options.from_config = options.devices;
@@ -219,6 +218,10 @@ void FieldGateway::stop() {
   if (s.http) s.http->stop(std::chrono::seconds(1));
   if (s.sender) s.sender->stop();
   if (s.devices) s.devices->stop();  // what waits goes to the outbox while it is open
+  if (s.outbox && !s.outbox->try_disk())
+    server::log(
+        LogLevel::error, "rows were in memory alone and are lost; 'anchord replay' restores them",
+        {{"rows", std::to_string(s.outbox->state().rows_in_memory)}, {"why", s.outbox->state().trouble}});
   if (s.pool) s.pool->stop();
   s.http.reset();
   std::error_code ignored;

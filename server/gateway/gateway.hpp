@@ -20,6 +20,7 @@ struct GatewayOptions {
   std::string listen{"127.0.0.1:8421"};
   std::optional<MissionId> mission{};
   std::uint64_t max_bytes{std::uint64_t{4} << 30};            ///< of the outbox
+  bool new_outbox{false};                                     ///< also where one is missing
   std::uint64_t max_recording_bytes{std::uint64_t{8} << 30};  ///< beyond: the oldest parts go
   std::string version;
 };

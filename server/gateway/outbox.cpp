@@ -1,10 +1,14 @@
 #include "server/gateway/outbox.hpp"
 
 #include <algorithm>
+#include <mutex>
 #include <span>
 #include <utility>
 
 #include "core/base/locked.hpp"
+#include "core/base/whole_file.hpp"
+#include "server/gateway/disk_debt.hpp"
+#include "server/gateway/outbox_table.hpp"
 #include "server/storage/data_folder.hpp"
 #include "server/storage/reader_pool.hpp"
 #include "server/storage/sqlite_connection.hpp"
@@ -18,118 +22,47 @@ using sql::Connection;
 using sql::Query;
 using sql::SqliteConnection;
 
-constexpr std::int64_t k_application_id = 0x414e4f42;  // "ANOB"
-constexpr std::int64_t k_version = 1;
-constexpr std::uint64_t k_batch_overhead_bytes = 120;  ///< of a row of the table with its place in two trees
 constexpr std::uint64_t k_checkpoint_wal_bytes = 4u << 20;
 constexpr std::size_t k_readers = 2;
+// Room for rows of a quarter of an hour when other programs have filled the disk.
+constexpr std::uint64_t k_reserve_bytes = 16u << 20, k_keep_free_bytes = 64u << 20;
+constexpr const char* k_made = "outbox.made";  ///< one was made here; from then on a missing one is a loss
+constexpr const char* k_made_text = "The outbox of a gateway was made here: do not delete this file.\n";
 
-constexpr const char* k_schema = R"(
-CREATE TABLE batch(
-  id INTEGER PRIMARY KEY AUTOINCREMENT,
-  mission BLOB NOT NULL,
-  lines INTEGER NOT NULL,
-  n_rows INTEGER NOT NULL,
-  newest_ns INTEGER NOT NULL,
-  body BLOB NOT NULL);
-CREATE INDEX batch_of_mission ON batch(mission, id);
-CREATE TABLE total(
-  one INTEGER PRIMARY KEY CHECK(one = 1),
-  kept INTEGER NOT NULL, accepted INTEGER NOT NULL, duplicates INTEGER NOT NULL, rejected INTEGER NOT NULL,
-  mission BLOB, mission_at_ns INTEGER);
-INSERT INTO total VALUES(1, 0, 0, 0, 0, NULL, NULL);
-)";
-
-std::span<const std::byte> bytes_of(std::string_view text) { return std::as_bytes(std::span{text}); }
-std::string text_of(std::span<const std::byte> bytes) {
-  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
-}
-
-Error not_an_outbox(const fs::path& file, const std::string& why) {
+Error missing(const fs::path& file) {
   return make_error(
-      Errc::unsupported,
-      file.string() + " " + why + ": use another --data-dir, or the anchord version that created it");
+      Errc::storage_unavailable,
+      "the outbox " + file.string() +
+          " is missing or empty, and one was made here before. Put the file back with its -wal (is the disk "
+          "mounted?). Where it is lost, start once with --new-outbox; 'anchord replay' restores its rows from "
+          "the recordings beside it");
 }
 
-/// No table yet: new, or killed before the tables were there.
-bool is_empty(SqliteConnection& c) {
-  Query q(c, "SELECT count(*) FROM sqlite_master");
-  return q.step() && q.integer() == 0 && c.pragma("application_id") == 0;
-}
-
-/// A new file gets its tables; any other must be an outbox, whole and not newer.
-Result<void> prepare(SqliteConnection& c, const fs::path& file) {
-  if (is_empty(c)) {
-    c.execute("BEGIN IMMEDIATE");
-    c.execute("PRAGMA application_id=" + std::to_string(k_application_id));
-    c.execute("PRAGMA user_version=" + std::to_string(k_version));
-    c.execute(k_schema);
-    c.execute("COMMIT");
-    return sql::sync_path(file.parent_path());
-  }
-  if (c.pragma("application_id") != k_application_id)
-    return not_an_outbox(file, "is not the outbox of a gateway");
-  if (c.pragma("user_version") != k_version) return not_an_outbox(file, "is of a newer anchord");
-  const std::string found = c.check(false);
-  if (found == "ok") return boost::outcome_v2::success();
-  return make_error(Errc::storage_unavailable, "the outbox " + file.string() + " is damaged (" + found +
-                                                   "): move it and its -wal aside and start again; 'anchord "
-                                                   "replay' restores its rows from the recordings beside it");
-}
-
-Batch read_batch(Query& q) {
-  Batch batch;
-  batch.id = q.integer();
-  batch.mission = q.id<MissionId>();
-  batch.lines = q.one_of(k_lines_words);
-  batch.n_rows = q.as<std::uint32_t>();
-  batch.newest = q.time();
-  batch.body = text_of(q.blob());
-  return batch;
-}
-
-/// As many as fit, one at least; `more` says whether there was another.
-std::vector<Batch> read_batches(Query& q, std::uint64_t max_bytes, bool& more) {
+/// Of one mission, as many as fit and one at least.
+std::vector<Batch> oldest_in_memory(const std::map<std::int64_t, DiskDebt::Held>& held, std::int64_t until,
+                                    const std::set<MissionId>& waiting, std::uint64_t max_bytes) {
   std::vector<Batch> out;
-  more = false;
-  for (std::uint64_t bytes = 0; q.step();) {
-    auto batch = read_batch(q);
-    bytes += batch.body.size();
-    if (!out.empty() && bytes > max_bytes) {
-      more = true;
-      break;
-    }
-    out.push_back(std::move(batch));
+  std::uint64_t bytes = 0;
+  for (const auto& [id, batch] : held) {
+    if (id > until) break;
+    if (batch->mission == unassigned() || waiting.contains(batch->mission)) continue;
+    if (!out.empty() && batch->mission != out.front().mission) continue;
+    bytes += batch->body.size();
+    if (!out.empty() && bytes > max_bytes) break;
+    out.push_back(*batch);
   }
   return out;
 }
 
-/// The mission of the oldest batch that may be sent.
-std::optional<MissionId> oldest_mission(Connection& c, std::int64_t until, const std::set<MissionId>& held) {
-  const auto may_go = [&](const MissionId& id) { return id != unassigned() && !held.contains(id); };
-  {
-    Query first(c, "SELECT mission FROM batch WHERE id <= ?1 ORDER BY id LIMIT 1");
-    first << until;
-    if (!first.step()) return std::nullopt;
-    if (const auto id = first.id<MissionId>(); may_go(id)) return id;
-  }
-  Query each(c, "SELECT mission, min(id) AS first FROM batch WHERE id <= ?1 GROUP BY mission ORDER BY first");
-  each << until;
-  while (each.step()) {
-    if (const auto id = each.id<MissionId>(); may_go(id)) return id;
-  }
-  return std::nullopt;
+Totals sum(Totals a, const Totals& b) {
+  a.kept += b.kept;
+  a.accepted += b.accepted;
+  a.duplicates += b.duplicates;
+  a.rejected += b.rejected;
+  return a;
 }
-
-std::uint64_t weight(std::uint64_t body_bytes) { return body_bytes + k_batch_overhead_bytes; }
 
 }  // namespace
-
-MissionId unassigned() {
-  MissionId id;
-  id.uuid.bytes.fill(0xff);
-  return id;
-}
 
 struct Outbox::State {
   using Open = std::function<std::unique_ptr<SqliteConnection>(SqliteConnection::Mode)>;
@@ -139,12 +72,30 @@ struct Outbox::State {
         counts(now),
         readers([open] { return open(SqliteConnection::Mode::read_only); }, k_readers),
         queue(std::move(writer), file, [open] { return open(SqliteConnection::Mode::read_write); },
-              {[] { return false; }, [] {}}, {200'000, 100, k_checkpoint_wal_bytes}) {}
+              {[this] { return folder->give_up_reserve(); },
+               [this] { folder->fill_reserve(k_keep_free_bytes); }},
+              {200'000, 100, k_checkpoint_wal_bytes}) {}
 
   std::unique_ptr<sql::DataFolder> folder;  // its lock goes last
   Locked<OutboxState> counts;
+  Locked<DiskDebt> debt;
+  std::mutex writing;
   sql::ReaderPool readers;
   sql::WriteQueue queue;
+
+  /// What goes to the disk in one transaction, beside all that waits for it.
+  struct Change {
+    std::vector<Batch> kept;
+    std::vector<std::int64_t> gone;
+    Totals totals;
+  };
+  /// While `writing` is held. Why the disk does not take it; then nothing has changed but DiskDebt::trouble.
+  std::optional<Error> write(const Change& change);
+  void number(std::vector<Batch>& batches);
+  void note_trouble(const std::string& why) {
+    auto owed = debt.lock();
+    owed->trouble = why;
+  }
 
   template <class T, class F>
   Result<T> read(F work) {
@@ -158,47 +109,11 @@ struct Outbox::State {
   }
 };
 
-namespace {
-
-OutboxState counted(Connection& c, std::uint64_t max_bytes) {
-  OutboxState out;
-  out.max_bytes = max_bytes;
-  {
-    Query q(c,
-            "SELECT ifnull(sum(n_rows), 0), ifnull(sum(length(body)), 0), count(*), ifnull((SELECT seq FROM "
-            "sqlite_sequence WHERE name = 'batch'), 0) FROM batch");
-    if (q.step()) {
-      out.rows = q.as<std::uint64_t>();
-      const auto body_bytes = q.as<std::uint64_t>();
-      out.bytes = body_bytes + q.as<std::uint64_t>() * k_batch_overhead_bytes;
-      out.newest_id = q.integer();
-    }
-  }
-  {
-    const MissionId none = unassigned();
-    Query q(c, "SELECT ifnull(sum(n_rows), 0) FROM batch WHERE mission = ?1");
-    q << none;
-    if (q.step()) out.unassigned_rows = q.as<std::uint64_t>();
-  }
-  {
-    Query q(c, "SELECT kept, accepted, duplicates, rejected FROM total");
-    if (q.step()) {
-      out.totals.kept = q.as<std::uint64_t>();
-      out.totals.accepted = q.as<std::uint64_t>();
-      out.totals.duplicates = q.as<std::uint64_t>();
-      out.totals.rejected = q.as<std::uint64_t>();
-    }
-  }
-  return out;
-}
-
-}  // namespace
-
 Outbox::Outbox(std::unique_ptr<State> state) : state_(std::move(state)) {}
 Outbox::~Outbox() = default;
 
-Result<std::unique_ptr<Outbox>> Outbox::open(const fs::path& dir, std::uint64_t max_bytes) {
-  BOOST_OUTCOME_TRY(auto folder, sql::DataFolder::open(dir, 0));
+Result<std::unique_ptr<Outbox>> Outbox::open(const fs::path& dir, std::uint64_t max_bytes, bool anew) {
+  BOOST_OUTCOME_TRY(auto folder, sql::DataFolder::open(dir, k_reserve_bytes));
   if (folder->had_database() || !folder->postgres().empty() || fs::exists(folder->database())) {
     return make_error(
         Errc::conflict,
@@ -206,6 +121,8 @@ Result<std::unique_ptr<Outbox>> Outbox::open(const fs::path& dir, std::uint64_t 
   }
   const fs::path file = dir / "outbox.db";
   const bool fresh = !fs::exists(file) || fs::file_size(file) == 0;
+  const bool made = fs::exists(dir / k_made);
+  if (fresh && made && !anew) return missing(file);
   const auto open_as = [file](SqliteConnection::Mode mode) {
     return std::make_unique<SqliteConnection>(file, mode, Synchronous::full, std::nullopt);
   };
@@ -214,6 +131,8 @@ Result<std::unique_ptr<Outbox>> Outbox::open(const fs::path& dir, std::uint64_t 
     if (writer->read_only_file())
       return make_error(Errc::storage_unavailable, "the outbox " + file.string() + " is read-only");
     BOOST_OUTCOME_TRYV(prepare(*writer, file));
+    // A disk that is full is no reason to send nothing of an outbox that is there: the next start makes it.
+    if (!made) (void)write_whole(dir / k_made, k_made_text);
     const auto now = counted(*writer, max_bytes);
     auto state = std::make_unique<State>(std::move(folder), file, open_as, std::move(writer), now);
     return std::unique_ptr<Outbox>(new Outbox(std::move(state)));
@@ -222,102 +141,176 @@ Result<std::unique_ptr<Outbox>> Outbox::open(const fs::path& dir, std::uint64_t 
   }
 }
 
-Result<void> Outbox::keep(std::vector<Batch> batches) {
+void Outbox::State::number(std::vector<Batch>& batches) {
+  auto now = counts.lock();
+  for (auto& batch : batches) batch.id = ++now->newest_id;
+}
+
+std::optional<Error> Outbox::State::write(const Change& change) {
   std::uint64_t bytes = 0, rows = 0, without_mission = 0;
-  for (const auto& batch : batches) {
-    bytes += weight(batch.body.size());
+  for (const auto& batch : change.kept) {
+    bytes += weight(batch);
     rows += batch.n_rows;
     if (batch.mission == unassigned()) without_mission += batch.n_rows;
   }
+  std::map<std::int64_t, DiskDebt::Held> held;
+  Ids undeleted;
+  Totals totals = change.totals;
+  std::uint64_t held_bytes = 0;
   {
-    const auto counts = state_->counts.lock();
-    if (counts->bytes + bytes > counts->max_bytes) {
-      return make_error(Errc::storage_full, "the outbox is full: " + std::to_string(counts->rows) +
-                                                " rows wait in " + std::to_string(counts->bytes >> 20) +
-                                                " MiB (limit " + std::to_string(counts->max_bytes >> 20) +
-                                                " MiB, --max-mib)");
+    const auto owed = debt.lock();
+    const auto now = counts.lock();
+    if (now->bytes + bytes + owed->held_bytes() <= now->max_bytes) {
+      held = owed->held();
+      held_bytes = owed->held_bytes();
     }
+    undeleted = owed->undeleted;
+    totals = sum(totals, owed->uncounted);
   }
-  std::int64_t newest_id = 0;
-  const auto failed = state_->queue.write(rows, [&](Connection& c) -> std::optional<Error> {
-    for (const auto& batch : batches) {
-      Query q(c, "INSERT INTO batch(mission, lines, n_rows, newest_ns, body) VALUES(?1, ?2, ?3, ?4, ?5)");
-      q << batch.mission << static_cast<int>(batch.lines) << static_cast<int>(batch.n_rows) << batch.newest
-        << bytes_of(batch.body);
-      newest_id = q.inserted("id").value_or(newest_id);
-    }
-    Query total(c, "UPDATE total SET kept = kept + ?1");
-    total << rows;
-    total.run();
-    return std::nullopt;
-  });
-  if (failed) return *failed;
-  auto counts = state_->counts.lock();
-  counts->bytes += bytes;
-  counts->rows += rows;
-  counts->unassigned_rows += without_mission;
-  counts->totals.kept += rows;
-  counts->newest_id = std::max(counts->newest_id, newest_id);
+  totals.kept += rows;
+  Size gone;
+  const auto failed = queue.write(rows + held.size() + change.gone.size() + undeleted.size(),
+                                  [&](Connection& c) -> std::optional<Error> {
+                                    gone = {};
+                                    for (const auto& [id, batch] : held) insert(c, *batch);
+                                    for (const auto& batch : change.kept) insert(c, batch);
+                                    for (const auto id : change.gone) {
+                                      const Size one = remove(c, id);
+                                      gone.rows += one.rows;
+                                      gone.bytes += one.bytes;
+                                    }
+                                    // Their rows wait no more since the server answered for them.
+                                    for (const auto id : undeleted) gone.bytes += remove(c, id).bytes;
+                                    add_totals(c, totals);
+                                    return std::nullopt;
+                                  });
+  auto owed = debt.lock();
+  if (failed) {
+    owed->trouble = failed->message;
+    return failed;
+  }
+  if (!held.empty()) owed->stored();
+  owed->undeleted.clear();
+  owed->uncounted = {};
+  if (owed->held().empty()) owed->trouble.clear();
+  auto now = counts.lock();
+  now->bytes += bytes + held_bytes;
+  now->bytes -= std::min(now->bytes, gone.bytes);
+  now->rows += rows;
+  now->rows -= std::min(now->rows, gone.rows);
+  now->unassigned_rows += without_mission;
+  now->totals.kept += rows;
+  return std::nullopt;
+}
+
+Result<void> Outbox::keep(std::vector<Batch> batches) {
+  const std::lock_guard one(state_->writing);
+  std::uint64_t bytes = 0;
+  for (const auto& batch : batches) bytes += weight(batch);
+  const auto now = state_->counts.copy();
+  if (now.bytes + bytes > now.max_bytes) {
+    auto full =
+        make_error(Errc::storage_full, "the outbox is full: " + std::to_string(now.rows) + " rows wait in " +
+                                           std::to_string(now.bytes >> 20) + " MiB (limit " +
+                                           std::to_string(now.max_bytes >> 20) + " MiB, --max-mib)");
+    state_->note_trouble(full.message);
+    return full;
+  }
+  state_->number(batches);
+  if (auto failed = state_->write({std::move(batches), {}, {}})) return *std::move(failed);
   return boost::outcome_v2::success();
 }
 
+bool Outbox::hold(std::vector<Batch> batches) {
+  const std::lock_guard one(state_->writing);
+  state_->number(batches);
+  std::uint64_t rows = 0, without_mission = 0;
+  for (const auto& batch : batches) {
+    rows += batch.n_rows;
+    if (batch.mission == unassigned()) without_mission += batch.n_rows;
+  }
+  auto owed = state_->debt.lock();
+  if (!owed->hold(std::move(batches), k_most_held_bytes)) return false;
+  owed->uncounted.kept += rows;
+  auto now = state_->counts.lock();
+  now->rows += rows;
+  now->unassigned_rows += without_mission;
+  now->totals.kept += rows;
+  return true;
+}
+
+bool Outbox::try_disk() {
+  const std::lock_guard one(state_->writing);
+  {
+    const auto owed = state_->debt.lock();
+    if (owed->trouble.empty() && owed->none()) return true;
+  }
+  if (state_->write({})) return false;
+  const auto owed = state_->debt.lock();
+  return owed->none();
+}
+
+bool Outbox::delivered(const Delivered& delivered) {
+  const std::lock_guard one(state_->writing);
+  const Totals totals{0, delivered.accepted, delivered.duplicates, delivered.rejected};
+  std::vector<std::int64_t> on_disk;
+  std::uint64_t rows = 0;
+  {
+    auto owed = state_->debt.lock();
+    for (const auto id : delivered.ids) {
+      if (const auto released = owed->release(id))
+        rows += *released;
+      else
+        on_disk.push_back(id);
+    }
+  }
+  const bool written = !state_->write({{}, on_disk, totals});
+  if (!written) {
+    const auto left = state_->read<Size>([&](Connection& c) { return size_of(c, on_disk); });
+    if (left) rows += left.value().rows;
+    auto owed = state_->debt.lock();
+    owed->undeleted.insert(on_disk.begin(), on_disk.end());
+    owed->uncounted = sum(owed->uncounted, totals);
+  }
+  auto now = state_->counts.lock();
+  now->rows -= std::min(now->rows, rows);
+  now->totals = sum(now->totals, totals);
+  return written;
+}
+
 Result<Newest> Outbox::newest(std::int64_t after, std::uint64_t max_bytes) {
-  return state_->read<Newest>([&](Connection& c) {
-    Newest out;
-    const MissionId none = unassigned();  // what is bound must live as long as the query
-    Query q(c,
-            "SELECT id, mission, lines, n_rows, newest_ns, body FROM batch WHERE id > ?1 AND mission <> ?2 "
-            "ORDER BY id DESC");
-    q << after << none;
-    out.batches = read_batches(q, max_bytes, out.more);
-    return out;
-  });
+  const auto owed = state_->debt.copy();
+  BOOST_OUTCOME_TRY(auto out, state_->read<Newest>([&](Connection& c) {
+    return newest_on_disk(c, after, owed.undeleted, max_bytes);
+  }));
+  std::set<std::int64_t> there;
+  for (const auto& batch : out.batches) there.insert(batch.id);
+  for (const auto& [id, batch] : owed.held())
+    if (id > after && batch->mission != unassigned() && !there.contains(id)) out.batches.push_back(*batch);
+  if (there.size() == out.batches.size()) return out;
+  std::ranges::sort(out.batches, std::ranges::greater{}, &Batch::id);
+  std::uint64_t bytes = 0;
+  const auto beyond = std::ranges::find_if(
+      out.batches, [&](const Batch& batch) { return (bytes += batch.body.size()) > max_bytes; });
+  const auto first = out.batches.begin() + 1;
+  if (beyond == out.batches.end()) return out;
+  out.more = true;
+  out.batches.erase(std::max(beyond, first), out.batches.end());
+  return out;
 }
 
 Result<std::vector<Batch>> Outbox::oldest(std::int64_t until, const std::set<MissionId>& held,
                                           std::uint64_t max_bytes) {
-  return state_->read<std::vector<Batch>>([&](Connection& c) {
-    const auto mission = oldest_mission(c, until, held);
-    if (!mission) return std::vector<Batch>{};
-    Query q(c,
-            "SELECT id, mission, lines, n_rows, newest_ns, body FROM batch WHERE mission = ?1 AND id <= ?2 "
-            "ORDER BY id");
-    q << *mission << until;
-    bool more = false;
-    return read_batches(q, max_bytes, more);
-  });
-}
-
-Result<void> Outbox::delivered(const Delivered& delivered) {
-  std::uint64_t rows = 0, bytes = 0;
-  const auto failed = state_->queue.write(delivered.ids.size(), [&](Connection& c) -> std::optional<Error> {
-    rows = bytes = 0;
-    for (const auto id : delivered.ids) {
-      Query q(c, "DELETE FROM batch WHERE id = ?1 RETURNING n_rows, length(body)");
-      q << id;
-      while (q.step()) {
-        rows += q.as<std::uint64_t>();
-        bytes += weight(q.as<std::uint64_t>());
-      }
-    }
-    Query total(c,
-                "UPDATE total SET accepted = accepted + ?1, duplicates = duplicates + ?2, "
-                "rejected = rejected + ?3");
-    total << delivered.accepted << delivered.duplicates << delivered.rejected;
-    total.run();
-    return std::nullopt;
-  });
-  if (failed) return *failed;
-  auto counts = state_->counts.lock();
-  counts->rows -= std::min(counts->rows, rows);
-  counts->bytes -= std::min(counts->bytes, bytes);
-  counts->totals.accepted += delivered.accepted;
-  counts->totals.duplicates += delivered.duplicates;
-  counts->totals.rejected += delivered.rejected;
-  return boost::outcome_v2::success();
+  const auto owed = state_->debt.copy();
+  BOOST_OUTCOME_TRY(auto found, state_->read<std::vector<Batch>>([&](Connection& c) {
+    return oldest_on_disk(c, until, held, owed.undeleted, max_bytes);
+  }));
+  if (!found.empty()) return found;
+  return oldest_in_memory(owed.held(), until, held, max_bytes);
 }
 
 Result<std::uint64_t> Outbox::assign(const MissionId& mission) {
+  const std::lock_guard one(state_->writing);
   std::uint64_t rows = 0;
   const auto failed = state_->queue.write(1, [&](Connection& c) -> std::optional<Error> {
     rows = 0;
@@ -328,6 +321,8 @@ Result<std::uint64_t> Outbox::assign(const MissionId& mission) {
     return std::nullopt;
   });
   if (failed) return *failed;
+  auto owed = state_->debt.lock();
+  rows += owed->assign(mission);
   auto counts = state_->counts.lock();
   counts->unassigned_rows -= std::min(counts->unassigned_rows, rows);
   return rows;
@@ -353,14 +348,20 @@ Result<void> Outbox::note_mission(const LastMission& mission) {
   return boost::outcome_v2::success();
 }
 
-OutboxState Outbox::state() const { return state_->counts.copy(); }
+OutboxState Outbox::state() const {
+  OutboxState out = state_->counts.copy();
+  const auto owed = state_->debt.lock();
+  out.rows_in_memory = owed->held_rows();
+  out.trouble = owed->trouble;
+  return out;
+}
 
 std::optional<UtcTime> Outbox::oldest_waiting() {
-  const auto found = state_->read<std::optional<UtcTime>>([](Connection& c) -> std::optional<UtcTime> {
-    Query q(c, "SELECT newest_ns FROM batch ORDER BY id LIMIT 1");
-    return q.step() ? std::optional(q.time()) : std::nullopt;
-  });
-  return found ? found.value() : std::nullopt;
+  const auto owed = state_->debt.copy();
+  const auto found = state_->read<std::optional<UtcTime>>(
+      [&](Connection& c) { return oldest_time_on_disk(c, owed.undeleted); });
+  if (found && found.value()) return found.value();
+  return owed.held().empty() ? std::nullopt : std::optional(owed.held().begin()->second->newest);
 }
 
 }  // namespace anchord::gateway

@@ -9,39 +9,17 @@
 #include <string>
 #include <vector>
 
-#include "core/base/enum_table.hpp"
-#include "core/base/ids.hpp"
 #include "core/base/result.hpp"
-#include "core/base/time.hpp"
+#include "server/gateway/batch.hpp"
 
 namespace anchord::gateway {
 
-/// How the rows of a batch are written, and with that where they go.
-enum class Lines : std::uint8_t { fixes_csv, ranges_csv, ranges_ndjson };
-inline constexpr auto k_lines_words = enum_table<Lines>({{"fixes_csv", Lines::fixes_csv},
-                                                         {"ranges_csv", Lines::ranges_csv},
-                                                         {"ranges_ndjson", Lines::ranges_ndjson}});
-
-/// Rows that were measured while no mission was known: RFC 9562's Max UUID, which no mission has.
-MissionId unassigned();
-
-/// Rows of one kind that came together; they leave together.
-struct Batch {
-  std::int64_t id{};  ///< in the order of arrival; given by the outbox
-  MissionId mission{};
-  Lines lines{};
-  std::uint32_t n_rows{};
-  UtcTime newest{};  ///< measured
-  std::string body;  ///< one row a line, without a header
-};
-
-/// Since the outbox was made; kept with the rows.
-struct Totals {
-  std::uint64_t kept{}, accepted{}, duplicates{}, rejected{};
-};
 struct OutboxState {
-  std::uint64_t rows{}, bytes{}, max_bytes{}, unassigned_rows{};
-  std::int64_t newest_id{};  ///< of the newest batch there ever was
+  std::uint64_t rows{};  ///< that wait, those in memory among them
+  std::uint64_t bytes{}, max_bytes{}, unassigned_rows{};
+  std::uint64_t rows_in_memory{};  ///< alone, since the disk does not take them
+  std::string trouble;             ///< why the disk took nothing at the last attempt; empty: it did
+  std::int64_t newest_id{};        ///< of the newest batch there ever was
   Totals totals;
 };
 
@@ -58,12 +36,18 @@ struct Delivered {
 };
 
 /// Rows on the disk until the server has answered for them: an SQLite file, WAL, synced at each commit
-/// (docs/adr/0011-outbox.md). Bounded: full, it keeps what it has and refuses what comes. Thread-safe.
+/// (docs/adr/0011-outbox.md). Bounded: full, it keeps what it has and refuses what comes. What a full or
+/// broken disk does not take can be held in memory meanwhile, and rows go to the server all the same.
+/// Thread-safe.
 class Outbox {
  public:
-  /// Opens or makes DIR/outbox.db. Errors: conflict (another process has the folder, or it is a server's),
-  /// unsupported (no outbox, or a newer one), storage_unavailable (damaged), storage_full.
-  static Result<std::unique_ptr<Outbox>> open(const std::filesystem::path& dir, std::uint64_t max_bytes);
+  static constexpr std::uint64_t k_most_held_bytes = 16u << 20;
+
+  /// Opens DIR/outbox.db, or makes it where there never was one; with `anew` also where one is missing.
+  /// Errors: conflict (another process has the folder, or it is a server's), unsupported (no outbox, or a
+  /// newer one), storage_unavailable (damaged, or missing), storage_full.
+  static Result<std::unique_ptr<Outbox>> open(const std::filesystem::path& dir, std::uint64_t max_bytes,
+                                              bool anew = false);
   ~Outbox();
   Outbox(const Outbox&) = delete;
   Outbox& operator=(const Outbox&) = delete;
@@ -71,13 +55,19 @@ class Outbox {
   /// Returns when they are on the disk. Errors: storage_full (its own bound, or the disk's),
   /// storage_unavailable; nothing is kept then.
   Result<void> keep(std::vector<Batch> batches);
+  /// What keep() refused: in memory until the server has it or the disk takes it, whichever is first. False:
+  /// there is no room for it (k_most_held_bytes).
+  bool hold(std::vector<Batch> batches);
+  /// Where the disk took nothing: again, with all that waits for it. True: nothing waits for it.
+  bool try_disk();
   /// The newest that came after `after`, as many as fit; one at least. Those without a mission are left out.
   Result<Newest> newest(std::int64_t after, std::uint64_t max_bytes);
   /// The oldest up to `until` of one mission that is not in `held`, oldest first, as many as fit.
   Result<std::vector<Batch>> oldest(std::int64_t until, const std::set<MissionId>& held,
                                     std::uint64_t max_bytes);
-  /// They leave, and the totals grow, in one transaction.
-  Result<void> delivered(const Delivered& delivered);
+  /// They leave, and the totals grow, in one transaction. Where the disk takes no such change they are not
+  /// sent again by this process, and deleted once it does. False: the disk does not yet.
+  bool delivered(const Delivered& delivered);
   /// Rows without a mission are of this one. returns  how many
   Result<std::uint64_t> assign(const MissionId& mission);
 

@@ -31,6 +31,7 @@ constexpr std::uint64_t k_rate_from_bytes{2u << 10};  ///< smaller requests meas
 constexpr milliseconds k_ask_idle{1'000}, k_ask_recording{5'000}, k_ask_forbidden{30'000};
 constexpr milliseconds k_hold_time{60'000};
 constexpr milliseconds k_note_every{60'000};
+constexpr milliseconds k_disk_every{1'000};
 /// A restart in flight goes on with its mission; one of the next morning must not.
 constexpr double k_remember_s = 15 * 60;
 
@@ -120,9 +121,10 @@ class Sender::Impl {
 
   /// One step: waits, asks, or sends one piece of each kind.
   void round() {
+    look_at_disk();
     if (const auto left = std::chrono::ceil<milliseconds>(next_try_.copy() - Monotonic::now());
         left.count() > 0) {
-      wait(left, false);
+      wait(std::min(left, disk_trouble_.empty() ? left : k_disk_every), false);
       return;
     }
     release_held();
@@ -132,6 +134,18 @@ class Sender::Impl {
     if (live == Turn::over) return;
     if (send_backlog(sent) == Turn::over || sent) return;
     wait(std::chrono::ceil<milliseconds>(ask_at_ - Monotonic::now()), true);
+  }
+
+  /// Where the disk took nothing: again, also when no row comes that would show it.
+  void look_at_disk() {
+    if (Monotonic::now() < disk_at_) return;
+    disk_at_ = Monotonic::now() + k_disk_every;
+    (void)outbox_.try_disk();
+    const auto trouble = outbox_.state().trouble;
+    if (trouble.empty() != disk_trouble_.empty())
+      options_.log(trouble.empty() ? "rows are stored on the disk again"
+                                   : "rows are not stored on the disk, and sent from memory: " + trouble);
+    disk_trouble_ = trouble;
   }
 
   enum class Turn : std::uint8_t { goes_on, over };
@@ -355,6 +369,8 @@ class Sender::Impl {
   Link link_{Link::unknown};
   std::optional<Outbox::LastMission> remembered_{};
   std::string token_;
+  Monotonic::time_point disk_at_{};
+  std::string disk_trouble_;
   std::minstd_rand random_{std::random_device{}()};
   std::uniform_real_distribution<double> uniform_{0, 1};
 

@@ -50,11 +50,12 @@ void link_alarms(const Status& s, std::vector<Alarm>& out) {
 }
 
 void disk_alarms(const Status& s, std::vector<Alarm>& out) {
-  if (!s.keep_failure.empty())
+  if (!s.outbox.trouble.empty())
     out.push_back(
-        {"gateway.full", "rows are NOT stored: " + s.keep_failure +
-                             ". The newest rows wait in memory; when that is full, the oldest of them are "
-                             "lost. Raw bytes are recorded as long as the disk has space"});
+        {"gateway.full",
+         "rows are NOT stored on this machine: " + s.outbox.trouble +
+             ". The newest rows are in memory, and go to the server while there is a link; when memory is "
+             "full, the oldest of them are lost. Raw bytes are recorded as long as the disk has space"});
   else if (static_cast<double>(s.outbox.bytes) > k_filling_share * static_cast<double>(s.outbox.max_bytes))
     out.push_back({"gateway.filling", "the outbox has " + mib(s.outbox.bytes) + " of " +
                                           mib(s.outbox.max_bytes) +
@@ -99,6 +100,7 @@ Ordered outbox_json(const Status& s) {
   const auto live = live_age_s(s);
   return {{"rows", s.outbox.rows},
           {"rows_without_mission", s.outbox.unassigned_rows},
+          {"rows_in_memory", s.outbox.rows_in_memory},
           {"bytes", s.outbox.bytes},
           {"max_bytes", s.outbox.max_bytes},
           {"oldest_us", time_json(s.oldest_waiting)},
@@ -132,8 +134,8 @@ std::vector<Alarm> alarms_of(const Status& status) {
 }
 
 std::string ready_json(const Status& status) {
-  if (status.keep_failure.empty()) return R"({"status":"ready"})";
-  return to_wire(Ordered{{"status", "not ready"}, {"reason", status.keep_failure}});
+  if (status.outbox.trouble.empty()) return R"({"status":"ready"})";
+  return to_wire(Ordered{{"status", "not ready"}, {"reason", status.outbox.trouble}});
 }
 
 std::string status_json(const Status& s) {
@@ -173,13 +175,15 @@ std::string metrics_text(const Status& s) {
              s.sender.link == Link::up ? 1.0 : 0.0},
       Metric{"anchord_gateway_outbox_rows", "gauge", "Rows waiting to be sent to the server",
              n(s.outbox.rows)},
+      Metric{"anchord_gateway_rows_in_memory", "gauge",
+             "Rows that wait in memory alone, since the disk does not take them", n(s.outbox.rows_in_memory)},
       Metric{"anchord_gateway_outbox_bytes", "gauge", "Size of the waiting rows on the disk",
              n(s.outbox.bytes)},
       Metric{"anchord_gateway_outbox_max_bytes", "gauge", "Size of the outbox beyond which no row is stored",
              n(s.outbox.max_bytes)},
       Metric{"anchord_gateway_live_age_seconds", "gauge",
              "Age of the newest row that the server has; 0 before the first", live_age_s(s).value_or(0)},
-      Metric{"anchord_gateway_bytes_per_second", "gauge", "Duration of the newest requests with rows",
+      Metric{"anchord_gateway_bytes_per_second", "gauge", "Speed of the newest requests with rows",
              s.sender.bytes_per_s},
       Metric{"anchord_gateway_disk_free_bytes", "gauge", "Free space on the disk of the data folder",
              n(s.disk_free_bytes)},

@@ -21,7 +21,6 @@ struct Status {
   std::uint64_t disk_free_bytes{};
   std::vector<DeviceReport> devices;
   std::string recorder_failure, not_started;
-  std::string keep_failure;      ///< why the newest rows could not be kept; empty: they could
   std::uint64_t rows_dropped{};  ///< the outbox did not take them in time, and memory was full
   std::string rejected_file;
 };

@@ -1,6 +1,9 @@
 // The gateway as the aircraft has it, over bad links, bad answers and its own sudden end: nothing that it kept is lost, nothing is stored twice.
 import assert from 'node:assert/strict';
+import { execFileSync } from 'node:child_process';
+import { existsSync, rmSync, statSync, writeFileSync } from 'node:fs';
 import { createServer, request } from 'node:http';
+import { join } from 'node:path';
 import { test } from 'node:test';
 import {
   Feeder,
@@ -238,6 +241,94 @@ test('a full outbox keeps what it has, says so, and takes rows again when the li
     },
     { args: ['--max-mib', '1'] },
   ));
+
+/** The files of this process may be no longer than so many bytes from now on, as on a disk that is full; '' lifts that. */
+const limitFiles = (child, bytes) => execFileSync('prlimit', ['--pid', `${child.pid}`, `--fsize=${bytes}:`]);
+
+test('a disk that takes nothing more stops no row while there is a link, and the gateway says so until it does', () =>
+  rig(async ({ server, feeder, gateway }) => {
+    const mission = await recordingMission(server);
+    await gateway.start();
+    await recordsInto(gateway, mission);
+    await eventually('the tag is there', () => feeder.connected);
+    feeder.run(300);
+    await eventually('rows arrive', async () => (await storedCount(server, mission)) > 100);
+    limitFiles(gateway.child, 0);
+    await eventually('it says so', async () => (await gateway.alarms()).includes('gateway.full'), 20_000);
+    assert.equal((await fetch(`${gateway.url}/readyz`)).status, 503);
+    const before = await storedCount(server, mission);
+    await sleep(6_000);
+    const meanwhile = (await storedCount(server, mission)) - before;
+    assert.ok(meanwhile > 6 * 300 * 0.7, `${meanwhile} rows came while the disk took none`);
+    const status = await gateway.status();
+    assert.equal(status.rows.lost, 0);
+    assert.ok(status.outbox.live_age_s < 3, `${status.outbox.live_age_s} s`);
+    feeder.pause();
+    await drained(gateway);
+    // Nothing comes any more that would show that the disk works again.
+    limitFiles(gateway.child, 'unlimited');
+    await eventually('ready', async () => (await fetch(`${gateway.url}/readyz`)).status === 200, 10_000);
+    feeder.burst(50);
+    await drained(gateway);
+    await everyRowOnce(server, mission, feeder);
+    await eventually('no alarm stands', async () => (await gateway.alarms()).length === 0, 20_000);
+    const counted = await gateway.status();
+    assert.equal(counted.rows.kept, feeder.sent.length);
+    assert.equal(counted.rows.accepted + counted.rows.duplicates, feeder.sent.length);
+    assert.equal(counted.rows.duplicates, 0);
+    // What was deleted while nothing could be is not sent by the next process.
+    assert.equal((await gateway.kill('SIGTERM')).code, 0);
+    await gateway.start(['--mission', mission]);
+    assert.equal((await gateway.status()).outbox.rows, 0);
+  }));
+
+test('rows that are in memory alone when the link goes are on the disk once that takes them', () =>
+  rig(async ({ server, feeder, proxy, gateway }) => {
+    const mission = await recordingMission(server);
+    await gateway.start();
+    await recordsInto(gateway, mission);
+    await eventually('the tag is there', () => feeder.connected);
+    feeder.burst(100);
+    await everyRowOnce(server, mission, feeder);
+    await drained(gateway);
+    await proxy.cut();
+    limitFiles(gateway.child, 0);
+    feeder.burst(500);
+    await eventually('they wait in memory', async () => (await gateway.status()).outbox.rows_in_memory === 500, 20_000);
+    limitFiles(gateway.child, 'unlimited');
+    await eventually('they are on the disk', async () => (await gateway.status()).outbox.rows_in_memory === 0, 40_000);
+    assert.equal((await gateway.status()).outbox.rows, 500);
+    await gateway.kill();
+    await proxy.restore();
+    await gateway.start(['--mission', mission]);
+    await drained(gateway);
+    await everyRowOnce(server, mission, feeder);
+  }));
+
+test('an outbox that is gone or empty is refused with what to do, and made anew only where that is asked for', () =>
+  rig(async ({ server, feeder, gateway }) => {
+    const mission = await recordingMission(server);
+    await gateway.start();
+    await recordsInto(gateway, mission);
+    await eventually('the tag is there', () => feeder.connected);
+    feeder.burst(20);
+    await everyRowOnce(server, mission, feeder);
+    await gateway.kill('SIGTERM');
+    await eventually('the tag is left', () => !feeder.connected);
+    const file = join(gateway.dataDir, 'outbox.db');
+    for (const spoil of [() => writeFileSync(file, ''), () => rmSync(file)]) {
+      spoil();
+      gateway.log = '';
+      await assert.rejects(gateway.start());
+      assert.match(gateway.log, /outbox\.db is missing or empty.*--new-outbox/s);
+      assert.ok(!existsSync(file) || statSync(file).size === 0, 'nothing was made');
+    }
+    await gateway.start(['--new-outbox']);
+    await recordsInto(gateway, mission);
+    await eventually('the tag is there', () => feeder.connected);
+    feeder.burst(20);
+    await everyRowOnce(server, mission, feeder);
+  }));
 
 test('without a server at the start rows wait for their mission, which a person names', () =>
   rig(async ({ server, feeder, proxy, gateway }) => {

@@ -1,7 +1,9 @@
 #include "server/gateway/outbox.hpp"
 
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 
+#include <csignal>
 #include <fstream>
 #include <random>
 #include <thread>
@@ -83,6 +85,98 @@ TEST(GatewayOutbox, RefusesWhatComesWhenItIsFullAndTakesAgainWhenRowsHaveLeft) {
   EXPECT_EQ(outbox->state().rows, 1u);
   ASSERT_TRUE(outbox->delivered({{outbox->newest(0, 1).value().batches.front().id}, 1, 0, 0}));
   EXPECT_TRUE(outbox->keep({batch(k_first, body)}));
+}
+
+/// No file of this process grows while it lives, as on a disk that is full.
+class FullDisk {
+ public:
+  FullDisk() {
+    former_handler_ = std::signal(SIGXFSZ, SIG_IGN);
+    ::getrlimit(RLIMIT_FSIZE, &former_);
+    const rlimit none{0, former_.rlim_max};
+    ::setrlimit(RLIMIT_FSIZE, &none);
+  }
+  ~FullDisk() {
+    ::setrlimit(RLIMIT_FSIZE, &former_);
+    std::signal(SIGXFSZ, former_handler_);
+  }
+  FullDisk(const FullDisk&) = delete;
+  FullDisk& operator=(const FullDisk&) = delete;
+
+ private:
+  rlimit former_{};
+  void (*former_handler_)(int){};
+};
+
+TEST(GatewayOutbox, OnAFullDiskRowsLeaveFromMemoryAndWhatLeftIsNotSentAgain) {
+  ScratchDir dir;
+  const auto outbox = opened(dir.path());
+  ASSERT_TRUE(outbox->keep({batch(k_first, "a\n"), batch(k_second, "b\n")}));
+  const auto kept = outbox->newest(0, 100).value().batches;
+  ASSERT_EQ(kept.size(), 2u);
+  {
+    const FullDisk full;
+    ASSERT_FALSE(outbox->keep({batch(k_first, "c\n")}));
+    ASSERT_TRUE(outbox->hold({batch(k_first, "c\n"), batch(unassigned(), "d\n"), batch(k_first, "e\n")}));
+    EXPECT_EQ(outbox->state().rows, 5u);
+    EXPECT_EQ(outbox->state().rows_in_memory, 3u);
+    EXPECT_NE(outbox->state().trouble, "");
+    const auto newest = outbox->newest(0, 4).value();
+    EXPECT_EQ(bodies(newest.batches), (Texts{"e\n", "c\n"})) << "those with a mission, newest first";
+    EXPECT_TRUE(newest.more);
+    EXPECT_FALSE(outbox->delivered({{kept[1].id, newest.batches[0].id}, 2, 0, 0}));
+    EXPECT_EQ(bodies(outbox->newest(0, 100).value().batches), (Texts{"c\n", "b\n"}));
+    EXPECT_EQ(bodies(outbox->oldest(1000, {}, 100).value()), (Texts{"b\n"}))
+        << "k_first's on the disk has left";
+    EXPECT_EQ(bodies(outbox->oldest(1000, {k_second}, 100).value()), (Texts{"c\n"}));
+    EXPECT_EQ(outbox->state().rows, 3u);
+    EXPECT_FALSE(outbox->try_disk());
+  }
+  EXPECT_TRUE(outbox->try_disk());
+  EXPECT_EQ(outbox->state().trouble, "");
+  EXPECT_EQ(outbox->state().rows_in_memory, 0u);
+  EXPECT_EQ(outbox->state().unassigned_rows, 1u);
+  EXPECT_EQ(bodies(outbox->newest(0, 100).value().batches), (Texts{"c\n", "b\n"}));
+  EXPECT_EQ(outbox->state().totals.kept, 5u);
+  EXPECT_EQ(outbox->state().totals.accepted, 2u);
+}
+
+TEST(GatewayOutbox, WhatWasInMemoryIsThereAfterARestartOnceTheDiskTookIt) {
+  ScratchDir dir;
+  std::uint64_t bytes = 0;
+  {
+    const auto outbox = opened(dir.path());
+    {
+      const FullDisk full;
+      ASSERT_TRUE(outbox->hold({batch(k_first, "a\nb\n", 2)}));
+      EXPECT_TRUE(outbox->hold({batch(k_first, std::string(Outbox::k_most_held_bytes / 2, 'x'))}));
+      EXPECT_FALSE(outbox->hold({batch(k_first, std::string(Outbox::k_most_held_bytes / 2, 'x'))}))
+          << "there is no room for it";
+    }
+    ASSERT_TRUE(outbox->keep({batch(k_first, "c\n")}));
+    EXPECT_EQ(outbox->state().rows_in_memory, 0u) << "they come to the disk with the next";
+    bytes = outbox->state().bytes;
+  }
+  const auto outbox = opened(dir.path());
+  EXPECT_EQ(outbox->state().rows, 4u);
+  EXPECT_EQ(outbox->state().bytes, bytes);
+  EXPECT_EQ(outbox->state().totals.kept, 4u);
+  EXPECT_EQ(outbox->oldest(1000, {}, 4).value().front().body, "a\nb\n");
+}
+
+TEST(GatewayOutbox, IsMadeOnceAndAMissingOneIsALossUntilAPersonSaysOtherwise) {
+  ScratchDir dir;
+  { ASSERT_TRUE(opened(dir.path())->keep({batch(k_first, "a\n")})); }
+  for (const char* part : {"", "-wal", "-shm"})
+    std::filesystem::remove((dir.path() / "outbox.db").string() + part);
+  const auto refused = Outbox::open(dir.path(), k_roomy);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, Errc::storage_unavailable);
+  EXPECT_NE(refused.error().message.find("--new-outbox"), std::string::npos) << refused.error().message;
+  EXPECT_FALSE(std::filesystem::exists(dir.path() / "outbox.db"));
+  const auto anew = Outbox::open(dir.path(), k_roomy, true);
+  ASSERT_TRUE(anew) << anew.error().message;
+  EXPECT_EQ(anew.value()->state().rows, 0u);
 }
 
 TEST(GatewayOutbox, KeepsNothingMoreOnceItsFileWasRemovedAndSavesWhatItHad) {
