@@ -32,6 +32,7 @@ constexpr milliseconds k_ask_idle{1'000}, k_ask_recording{5'000}, k_ask_forbidde
 constexpr milliseconds k_hold_time{60'000};
 constexpr milliseconds k_note_every{60'000};
 constexpr milliseconds k_disk_every{1'000};
+constexpr std::uint64_t k_most_answer_bytes{4u << 20};
 /// A restart in flight goes on with its mission; one of the next morning must not.
 constexpr double k_remember_s = 15 * 60;
 
@@ -313,7 +314,13 @@ class Sender::Impl {
     }
     std::map<std::string, std::string> headers;
     if (!token_.empty()) headers.emplace("Authorization", "Bearer " + token_);
-    auto answer = client_.call(method, target, body, type, headers);
+    // On the networks of a field anybody may answer.
+    auto answer = client_.call({.method = method,
+                                .target = target,
+                                .body = body,
+                                .content_type = type.empty() ? "application/json" : type,
+                                .headers = std::move(headers),
+                                .most_bytes = k_most_answer_bytes});
     update([](auto& s) { ++s.requests; });
     return answer;
   }

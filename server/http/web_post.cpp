@@ -3,6 +3,7 @@
 #include <netdb.h>
 
 #include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <functional>
 #include <optional>
@@ -10,6 +11,7 @@
 
 #include "core/base/locked.hpp"
 #include "core/base/text.hpp"
+#include "server/http/answer_watch.hpp"
 #include "server/http/public_address.hpp"
 
 // Last, and never before Eigen: it brings <resolv.h>, whose macro `_res` breaks Eigen's headers.
@@ -138,7 +140,14 @@ class HttpPost final : public WebPost {
     client.set_connection_timeout(k_step);
     client.set_read_timeout(k_step);
     client.set_write_timeout(k_step);
+    std::atomic<int> socket{-1};
+    client.set_socket_options([&socket](int opened) {
+      httplib::default_socket_options(opened);
+      socket = opened;
+    });
     if (!enter(&client)) return make_error(Errc::canceled, "the server is stopping");
+    // A receiver is a stranger: its head may come a drop at a time, or never end.
+    AnswerWatch watch(socket, {k_whole, [&client] { client.stop(); }});
     const auto end = Steady::now() + k_whole;
     Answer answer;
     httplib::Request request;
@@ -147,10 +156,12 @@ class HttpPost final : public WebPost {
     request.body = message.body;
     for (const auto& [name, value] : message.headers) request.headers.emplace(name, value);
     request.response_handler = [&](const httplib::Response& head) {
+      watch.begun();
       answer.status = head.status;
       return true;
     };
     request.content_receiver = [&](const char* bytes, std::size_t n, std::uint64_t, std::uint64_t) {
+      watch.received(n);
       answer.body.append(bytes, std::min(n, k_most_answer - answer.body.size()));
       return answer.body.size() < k_most_answer && Steady::now() < end;
     };
@@ -160,6 +171,7 @@ class HttpPost final : public WebPost {
     if (result) answer.status = result->status;
     if (answer.status != 0) return answer;  // perhaps its body was cut off
     if (stopped) return make_error(Errc::canceled, "the server is stopping");
+    if (const auto why = watch.why(); !why.empty()) return make_error(Errc::link_lost, url.host + " " + why);
     return make_error(Errc::link_lost, "no answer from " + url.host + " (" + pinned +
                                            "): " + httplib::to_string(result.error()));
   }
