@@ -62,6 +62,20 @@ void clock(const FlightPulse& f, std::vector<AlarmCondition>& out) {
   out.push_back({"clock.skew", AlarmPriority::warning, f.name + text, f.mission});
 }
 
+void models(const FlightPulse& f, std::vector<AlarmCondition>& out) {
+  if (!f.models_withheld.empty())
+    out.push_back({"model.withheld", AlarmPriority::warning,
+                   f.name + ": corrections of the promoted models are not applied, " +
+                       std::string(f.models_withheld) +
+                       "; train on ranges like these, or roll the model back",
+                   f.mission});
+  if (!f.models_moved.empty())
+    out.push_back({"model.moved", AlarmPriority::warning,
+                   f.name + ": the promoted models move anchors by more than 3 m (" + f.models_moved +
+                       "); compare with the positions without them, or roll the model back",
+                   f.mission});
+}
+
 }  // namespace
 
 std::vector<AlarmCondition> alarm_conditions(const std::vector<FlightPulse>& flights,
@@ -119,6 +133,7 @@ std::vector<AlarmCondition> alarm_conditions(const std::vector<FlightPulse>& fli
     rtk(f, out);
     ranges(f, out);
     clock(f, out);
+    models(f, out);
   }
   return out;
 }

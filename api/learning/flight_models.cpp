@@ -4,6 +4,7 @@
 #include <array>
 #include <nlohmann/json.hpp>
 
+#include "api/kit/current_sites.hpp"
 #include "api/kit/reader.hpp"
 #include "api/learning/range_features.hpp"
 
@@ -53,6 +54,8 @@ Result<ModelRegistry::Active> models_for(const FlightModelsWish& wish, const Mod
     chosen.erase(task);
     if (text != "none") {
       BOOST_OUTCOME_TRY(const auto uuid, parse_uuid(text));
+      // Models are of the whole server: to a token that is bound to sites there is none by any id.
+      if (!current_sites().all()) return make_error(Errc::not_found, "no model " + to_string(uuid));
       chosen[task] = ModelId{uuid};
     }
   }
@@ -77,6 +80,8 @@ FlightModelsReport correct_flight(const ModelRegistry::Active& models, FlightDat
                                   const StatedNoise& noise) {
   FlightModelsReport out;
   double sum = 0;
+  std::size_t n_withheld = 0;
+  std::string withheld;  // the first, in words
   std::vector<std::optional<RangeErrorModel>> error_models(flight.ranges.size());
   for (std::size_t i = 0; i < flight.ranges.size(); ++i) {
     Range& range = flight.ranges[i];
@@ -84,9 +89,10 @@ FlightModelsReport correct_flight(const ModelRegistry::Active& models, FlightDat
     ++out.n_ranges;
     const auto features = features_of(range);
     const auto judged = ModelRegistry::predict(models, features);
-    if (!judged.note.empty()) {
+    if (!judged.note.empty() && out.note.empty()) out.note = judged.note;
+    if (judged.verdict.withheld_m && n_withheld++ == 0) withheld = judged.note;
+    if (!judged.verdict.p_los && !judged.verdict.bias_m) {
       ++out.n_silent;
-      if (out.note.empty()) out.note = judged.note;
       continue;
     }
     if (judged.verdict.los) ++(*judged.verdict.los ? out.n_los : out.n_nlos);
@@ -110,6 +116,10 @@ FlightModelsReport correct_flight(const ModelRegistry::Active& models, FlightDat
     ++out.n_corrected;
   }
   if (out.n_corrected > 0) out.mean_correction_m = sum / static_cast<double>(out.n_corrected);
+  if (n_withheld > 0)
+    flight.notes.push_back("the corrections of " + std::to_string(n_withheld) + " of " +
+                           std::to_string(out.n_ranges) +
+                           " ranges are not applied, for example: " + withheld);
   out.n_believed = static_cast<std::size_t>(
       std::ranges::count_if(error_models, [](const auto& error_model) { return error_model.has_value(); }));
   if (out.n_believed > 0) flight.error_models = std::move(error_models);

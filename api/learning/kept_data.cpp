@@ -31,4 +31,21 @@ Result<KeptData> kept_data(DatasetStore& datasets, std::span<const std::string> 
   return out;
 }
 
+Result<std::optional<DatasetTable>> table_of_digest(DatasetStore& datasets, std::string_view digest) {
+  constexpr std::size_t k_page = 200;
+  std::optional<DatasetId> after;
+  while (true) {
+    BOOST_OUTCOME_TRY(const auto sets, datasets.datasets(k_page, after));
+    for (const auto& set : sets) {
+      if (set.digest != digest) continue;
+      BOOST_OUTCOME_TRY(const auto csv, datasets.csv(set.id));
+      auto parsed = DatasetTable::parse(csv);
+      if (!parsed) return std::optional<DatasetTable>{};  // of another version of the features
+      return std::optional{std::move(parsed).value()};
+    }
+    if (sets.size() < k_page) return std::optional<DatasetTable>{};
+    after = sets.back().id;
+  }
+}
+
 }  // namespace anchord::api

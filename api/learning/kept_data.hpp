@@ -1,7 +1,9 @@
 #pragma once
 
+#include <optional>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "api/learning/dataset_table.hpp"
@@ -19,5 +21,8 @@ struct KeptData {
 /// has none held out, unless a model to be judged was trained on that very data: its digest is in `learned`.
 /// Whose rows the model's task or features cannot use are left out when it is measured.
 Result<KeptData> kept_data(DatasetStore& datasets, std::span<const std::string> learned);
+
+/// The data set of this digest, whatever its name; nothing where none is kept.
+Result<std::optional<DatasetTable>> table_of_digest(DatasetStore& datasets, std::string_view digest);
 
 }  // namespace anchord::api

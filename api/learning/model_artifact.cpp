@@ -73,24 +73,26 @@ Ordered json_of(const ml::BiasMixture& m) {
   for (const auto& t : m.tail)
     tail.push_back({{"feature", t.feature}, {"mean", t.mean}, {"sd", t.sd}, {"weight", t.weight}});
   const auto& s = m.shared;
-  return {{"shared",
-           {{"centre_m", s.centre_m},
-            {"kappa", s.kappa},
-            {"features", s.features},
-            {"mean", s.mean},
-            {"sd", s.sd},
-            {"low", s.low},
-            {"high", s.high},
-            {"weight", s.weight},
-            {"offset_m", s.offset_m}}},
-          {"m0_m", m.m0_m},
-          {"s0_m", m.s0_m},
-          {"m1_m", m.m1_m},
-          {"s1_m", m.s1_m},
-          {"log_tau", m.log_tau},
-          {"tail", tail},
-          {"quantile", m.quantile},
-          {"gain", m.gain}};
+  Ordered out{{"shared",
+               {{"centre_m", s.centre_m},
+                {"kappa", s.kappa},
+                {"features", s.features},
+                {"mean", s.mean},
+                {"sd", s.sd},
+                {"low", s.low},
+                {"high", s.high},
+                {"weight", s.weight},
+                {"offset_m", s.offset_m}}},
+              {"m0_m", m.m0_m},
+              {"s0_m", m.s0_m},
+              {"m1_m", m.m1_m},
+              {"s1_m", m.s1_m},
+              {"log_tau", m.log_tau},
+              {"tail", tail},
+              {"quantile", m.quantile},
+              {"gain", m.gain}};
+  if (m.seen) out["seen"] = {{"min_m", m.seen->min_m}, {"max_m", m.seen->max_m}};
+  return out;
 }
 
 }  // namespace
@@ -124,6 +126,15 @@ std::string write_model_artifact(const ml::Model& model) {
   }
   if (model.mixture) out["mixture"] = json_of(*model.mixture);
   return to_wire(out) + "\n";
+}
+
+Result<std::string> checked_model_artifact(const ml::Model& model) {
+  std::string text = write_model_artifact(model);
+  if (const auto again = read_model_artifact(text); !again)
+    return make_error(
+        again.error().code,
+        "the model that was made could not be read again and is not kept: " + again.error().message);
+  return text;
 }
 
 }  // namespace anchord::api

@@ -1,8 +1,11 @@
+#include <array>
 #include <cmath>
+#include <cstdio>
 #include <nlohmann/json.hpp>
 
 #include "api/kit/reader.hpp"
 #include "api/learning/model_artifact.hpp"
+#include "core/ml/plausible.hpp"
 #include "core/nlos/features.hpp"
 
 namespace anchord::api {
@@ -10,7 +13,7 @@ namespace {
 
 using Json = nlohmann::json;
 
-constexpr double k_huge = 1e15;
+constexpr double k_huge = 1e15, k_most_bias_m = ml::k_most_bias_m;
 constexpr std::size_t k_max_nodes = 2'000'000, k_max_roots = 5'000, k_max_numbers = 8'000'000,
                       k_max_terms = 50'000;
 constexpr int k_max_tree_depth = 64;
@@ -44,7 +47,9 @@ class Walk {
     }
     const double v = value.get<double>();
     if (!std::isfinite(v) || v < low || v > high) {
-      fail(at, "out of range");
+      std::array<char, 120> text{};
+      std::snprintf(text.data(), text.size(), "out of range: %g, may be %g to %g", v, low, high);
+      fail(at, text.data());
       return low;
     }
     return v;
@@ -240,7 +245,7 @@ ml::BiasMixture mixture_of(Walk& w, const Json& j, std::size_t features) {
   ml::BiasMixture out;
   const Json& s = w.member(j, at, "shared");
   const std::string here = at + "/shared";
-  out.shared.centre_m = w.number(s, here, "centre_m", -100, 100);
+  out.shared.centre_m = w.number(s, here, "centre_m", -k_most_bias_m, k_most_bias_m);
   out.shared.kappa = w.number(s, here, "kappa", 0, 1);
   out.shared.features = w.indices<std::size_t>(s, here, "features", 0, features, 0, last);
   const std::size_t k = out.shared.features.size();
@@ -251,14 +256,19 @@ ml::BiasMixture mixture_of(Walk& w, const Json& j, std::size_t features) {
   for (std::size_t i = 0; w.ok() && i < k; ++i)
     if (out.shared.low[i] > out.shared.high[i]) w.fail(here + "/low", "above high");
   out.shared.weight = w.numbers(s, here, "weight", k, k);
-  out.shared.offset_m = w.number(s, here, "offset_m", -100, 100);
-  out.m0_m = w.number(j, at, "m0_m", -100, 100);
-  out.s0_m = w.number(j, at, "s0_m", 1e-4, 100);
-  out.m1_m = w.number(j, at, "m1_m", -100, 100);
-  out.s1_m = w.number(j, at, "s1_m", 1e-4, 100);
+  out.shared.offset_m = w.number(s, here, "offset_m", -k_most_bias_m, k_most_bias_m);
+  out.m0_m = w.number(j, at, "m0_m", -k_most_bias_m, k_most_bias_m);
+  out.s0_m = w.number(j, at, "s0_m", 1e-4, k_most_bias_m);
+  out.m1_m = w.number(j, at, "m1_m", -k_most_bias_m, k_most_bias_m);
+  out.s1_m = w.number(j, at, "s1_m", 1e-4, k_most_bias_m);
   out.log_tau = w.number(j, at, "log_tau", -20, 20);
   out.quantile = w.number(j, at, "quantile", 0.01, 0.99);
   out.gain = w.number(j, at, "gain", 0, 1);
+  if (w.ok() && j.contains("seen")) {
+    auto& seen = out.seen.emplace();
+    seen.min_m = w.number(j["seen"], at + "/seen", "min_m", -k_huge, k_huge);
+    seen.max_m = w.number(j["seen"], at + "/seen", "max_m", seen.min_m, k_huge);
+  }
   const Json& tail = w.member(j, at, "tail");
   if (!tail.is_array() || tail.size() > 8) w.fail(at + "/tail", "not an array of at most 8");
   for (std::size_t i = 0; w.ok() && i < tail.size(); ++i) {

@@ -1,9 +1,11 @@
 #include "api/learning/model_gate.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 
 #include "core/ml/evaluate.hpp"
+#include "core/ml/plausible.hpp"
 
 namespace anchord::api {
 namespace {
@@ -51,13 +53,16 @@ struct Compared {
   Figures candidate{}, current{};
 };
 
+enum class Side : std::uint8_t { test, train };
+
 /// Both on the rows that have what either needs; nothing where there are too few of them.
-std::optional<Compared> measured(const ml::Model& candidate, const ml::Model* current, const GateRows& on) {
+std::optional<Compared> measured(const ml::Model& candidate, const ml::Model* current, const GateRows& on,
+                                 Side side = Side::test) {
   if (on.table == nullptr) return std::nullopt;
   DatasetTable test;
   test.registers = on.table->registers;
   for (const auto& row : on.table->rows)
-    if (row.test && row.repeats == 1) test.rows.push_back(row);
+    if (row.test == (side == Side::test) && row.repeats == 1) test.rows.push_back(row);
   if (test.rows.empty()) return std::nullopt;
   const auto task = candidate.info.task;
   LearningWish wish{candidate.info.features, task != ml::Task::bias, task != ml::Task::nlos_id, {}, {}};
@@ -84,6 +89,102 @@ std::string figure(double value) {
   return text;
 }
 
+/// Collects checks, and in words what failed.
+class Checks {
+ public:
+  GateReport out;
+
+  void fail(GateCheck check, const std::string& why) {
+    check.passed = out.passed = false;
+    out.why += (out.why.empty() ? "" : "; ") + why;
+    out.checks.push_back(std::move(check));
+  }
+  /// Nothing where the candidate has no such figure.
+  void no_worse(const char* name, std::optional<double> a, std::optional<double> b, const std::string& basis,
+                const std::string& where) {
+    if (!a) return;
+    GateCheck check{name, a, b, true, basis};
+    if (b && *a > *b + k_slack)
+      fail(std::move(check), std::string(name) + " " + figure(*a) + " is worse than the " + figure(*b) +
+                                 " of the active model" + where);
+    else
+      out.checks.push_back(std::move(check));
+  }
+  /// Beside always saying the same class.
+  void helps(const Figures& mine, const std::string& basis, const std::string& where) {
+    GateCheck check{"helps", mine.accuracy, mine.commonest, true, basis};
+    if (!mine.accuracy || *mine.accuracy < *mine.commonest + k_slack)
+      fail(std::move(check), "accuracy " + figure(mine.accuracy.value_or(0)) + " is no better than the " +
+                                 figure(*mine.commonest) + " of always predicting the same class" + where);
+    else
+      out.checks.push_back(std::move(check));
+  }
+};
+
+/// More than one training row in twenty that no radio measures is no accident.
+constexpr double k_most_implausible = 0.05;
+
+/// What no radio measures: ranges of another unit, or a correction that could never be applied.
+void check_plausible(const ml::Model& candidate, const GateData& data, Checks& checks) {
+  const auto task = candidate.info.task;
+  if (task == ml::Task::nlos_id) return;
+  std::size_t n = 0, implausible = 0;
+  std::string example;
+  for (std::size_t i = 0; data.own != nullptr && i < data.own->rows.size(); ++i) {
+    const auto& row = data.own->rows[i];
+    if (!row.true_range_m || !(row.range_m() > 0)) continue;
+    if ((task == ml::Task::los_bias && row.los == false) || (task == ml::Task::nlos_bias && row.los == true))
+      continue;
+    ++n;
+    if (ml::plausible_range(row.range_m(), row.range_m() - *row.true_range_m)) continue;
+    if (implausible++ == 0)
+      example = figure(row.range_m()) + " m at a true " + figure(*row.true_range_m) + " m";
+  }
+  const double share = n > 0 ? static_cast<double>(implausible) / static_cast<double>(n) : 0;
+  GateCheck check{"plausible", share, k_most_implausible, true, "training_rows"};
+  if (share > k_most_implausible)
+    return checks.fail(std::move(check),
+                       std::to_string(implausible) + " of the " + std::to_string(n) +
+                           " rows it was trained on are no ranges of a radio in metres, for example " +
+                           example + ": correct the unit or the true distances, and train again");
+  const double usual_m = candidate.mixture     ? candidate.mixture->shared.centre_m
+                         : candidate.regressor ? candidate.regressor->fallback_m
+                                               : 0;
+  if (std::abs(usual_m) > ml::k_most_correction_m)
+    checks.fail({"plausible", std::abs(usual_m), ml::k_most_correction_m, true, "manifest"},
+                "its usual correction is " + figure(usual_m) + " m, and none beyond " +
+                    figure(ml::k_most_correction_m) + " m is applied: no radio errs by that much");
+}
+
+/// The candidate where the active model is at home.
+void check_active_places(const ml::Model& candidate, const ml::Model* current, const GateData& data,
+                         Checks& checks) {
+  if (!data.active.asked || current == nullptr) return;
+  const std::string basis = "active_places", where = " on the places of the active model";
+  auto both = measured(candidate, current, {data.active.table, basis, 1});
+  if (!both && data.active.believe_manifest) {
+    both = measured(candidate, current, {data.active.table, basis, k_least_kept_rows}, Side::train);
+    if (both) both->current = manifest_figures(*current);
+  }
+  const bool classes = candidate.info.task == ml::Task::nlos_id;
+  if (!both || !(classes ? both->candidate.fpr : both->candidate.mae_m) ||
+      !(classes ? both->current.fpr : both->current.mae_m))
+    return checks.fail(
+        {"places", std::nullopt, std::nullopt, true, "none"},
+        "nothing shows how it does on the places of the active model: " +
+            std::string(data.active.table == nullptr
+                            ? "the data that one was trained on are not kept here"
+                            : "its data have no single ranges with the features of both models, or of one "
+                              "class alone") +
+            "; freeze a data set that has them and train on it, or promote it with a reason");
+  if (!classes) return checks.no_worse("mae_m", both->candidate.mae_m, both->current.mae_m, basis, where);
+  checks.no_worse("fpr", both->candidate.fpr, both->current.fpr, basis, where);
+  // One that calls everything NLOS is never wrong about NLOS.
+  if (both->candidate.commonest && both->current.accuracy &&
+      *both->current.accuracy > *both->candidate.commonest)
+    checks.helps(both->candidate, basis, where);
+}
+
 }  // namespace
 
 GateReport gate_of(const ml::Model& candidate, const ml::Model* current, const GateData& data) {
@@ -104,62 +205,43 @@ GateReport gate_of(const ml::Model& candidate, const ml::Model* current, const G
     if (current != nullptr && !apart) theirs = manifest_figures(*current);
     basis = "manifest";
   }
-  GateReport out;
-  const auto fail = [&](GateCheck& check, const std::string& why) {
-    check.passed = out.passed = false;
-    out.why += (out.why.empty() ? "" : "; ") + why;
-  };
-  const auto no_worse = [&](const char* name, std::optional<double> a, std::optional<double> b) {
-    if (!a) return;
-    GateCheck check{name, a, b, true, basis};
-    if (b && *a > *b + k_slack)
-      fail(check, std::string(name) + " " + figure(*a) + " is worse than the " + figure(*b) +
-                      " of the active model");
-    out.checks.push_back(std::move(check));
-  };
-  if (!candidate.info.not_for_live.empty()) {
-    GateCheck single{"single_ranges", std::nullopt, std::nullopt, true, "manifest"};
-    fail(single, "the model is not for live ranges: " + candidate.info.not_for_live);
-    out.checks.push_back(std::move(single));
-  }
-  if (apart) {
-    GateCheck rows{"same_rows", std::nullopt, std::nullopt, true, "none"};
-    fail(rows,
-         "there are no rows of single ranges, unused in the training of both models, to compare it with the "
-         "active model: freeze a "
-         "data set with aggregation none that holds out places, or promote it with a reason");
-    out.checks.push_back(std::move(rows));
-  }
+  Checks checks;
+  if (!candidate.info.not_for_live.empty())
+    checks.fail({"single_ranges", std::nullopt, std::nullopt, true, "manifest"},
+                "the model is not for live ranges: " + candidate.info.not_for_live);
+  if (apart)
+    checks.fail({"same_rows", std::nullopt, std::nullopt, true, "none"},
+                "there are no rows of single ranges, unused in the training of both models, to compare it "
+                "with the active model: freeze a "
+                "data set with aggregation none that holds out places, or promote it with a reason");
   if (basis == "none") {
-    GateCheck evaluated{"evaluated", std::nullopt, std::nullopt, true, basis};
-    fail(evaluated,
-         "the model comes from another server, and no data set of this server has " +
-             std::to_string(k_least_kept_rows) +
-             " single ranges to evaluate it on: freeze one with other places, or promote it with a reason");
-    out.checks.push_back(std::move(evaluated));
-    return out;
+    checks.fail({"evaluated", std::nullopt, std::nullopt, true, basis},
+                "the model comes from another server, and no data set of this server has " +
+                    std::to_string(k_least_kept_rows) +
+                    " single ranges to evaluate it on: freeze one with other places, or promote it with a "
+                    "reason");
+    check_plausible(candidate, data, checks);
+    return checks.out;
   }
   if (candidate.info.task == ml::Task::nlos_id) {
-    no_worse("fpr", mine.fpr, theirs.fpr);
-    if (mine.commonest && !data.believe_manifest) {
-      GateCheck helps{"helps", mine.accuracy, mine.commonest, true, basis};
-      if (!mine.accuracy || *mine.accuracy < *mine.commonest + k_slack)
-        fail(helps, "accuracy " + figure(mine.accuracy.value_or(0)) + " is no better than the " +
-                        figure(*mine.commonest) + " of always predicting the same class");
-      out.checks.push_back(std::move(helps));
-    }
-    if (mine.accuracy) out.checks.push_back({"accuracy", mine.accuracy, theirs.accuracy, true, basis});
-    return out;
+    checks.no_worse("fpr", mine.fpr, theirs.fpr, basis, "");
+    if (mine.commonest && !data.believe_manifest) checks.helps(mine, basis, "");
+    if (mine.accuracy) checks.out.checks.push_back({"accuracy", mine.accuracy, theirs.accuracy, true, basis});
+  } else {
+    checks.no_worse("mae_m", mine.mae_m, theirs.mae_m, basis, "");
+    GateCheck helps{"helps", mine.mae_m, mine.mae_raw_m, true, basis};
+    if (!mine.mae_m || !mine.mae_raw_m)
+      checks.fail(std::move(helps),
+                  "nothing shows that the correction helps in places that were not used in training");
+    else if (*mine.mae_m > *mine.mae_raw_m - k_slack)
+      checks.fail(std::move(helps), "MAE " + figure(*mine.mae_m) + " m is no better than the " +
+                                        figure(*mine.mae_raw_m) + " m without a correction");
+    else
+      checks.out.checks.push_back(std::move(helps));
   }
-  no_worse("mae_m", mine.mae_m, theirs.mae_m);
-  GateCheck helps{"helps", mine.mae_m, mine.mae_raw_m, true, basis};
-  if (!mine.mae_m || !mine.mae_raw_m)
-    fail(helps, "nothing shows that the correction helps in places that were not used in training");
-  else if (*mine.mae_m > *mine.mae_raw_m - k_slack)
-    fail(helps, "MAE " + figure(*mine.mae_m) + " m is no better than the " + figure(*mine.mae_raw_m) +
-                    " m without a correction");
-  out.checks.push_back(std::move(helps));
-  return out;
+  check_plausible(candidate, data, checks);
+  check_active_places(candidate, current, data, checks);
+  return checks.out;
 }
 
 }  // namespace anchord::api

@@ -12,10 +12,11 @@ namespace anchord::api {
 
 /// One comparison before a promotion.
 struct GateCheck {
-  std::string name;  ///< single_ranges, evaluated, same_rows, fpr, accuracy, mae_m, helps
+  std::string name;  ///< single_ranges, plausible, evaluated, same_rows, fpr, accuracy, mae_m, helps, places
   std::optional<double> candidate{}, current{};
   bool passed{true};
   std::string basis;  ///< held_out: the places its own run held out; kept_data: places this server keeps;
+                      ///< active_places: those of the active model; training_rows: what it learned from;
                       ///< manifest: cross-validation of models made here, on the same rows and folds; none
 };
 
@@ -37,18 +38,32 @@ struct GateRows {
 /// Rows of data that are no part of the model's own run.
 inline constexpr std::size_t k_least_kept_rows = 10;
 
+/// The places of the active model, where the candidate must be no worse either.
+struct ActivePlaces {
+  bool asked{false};                   ///< there is an active model, and its data are not the candidate's own
+  const DatasetTable* table{nullptr};  ///< of its training run; null: not kept on this server
+  /// Where it held no place out: its out-of-fold figures may be believed, and the candidate is measured on
+  /// the rows they are of.
+  bool believe_manifest{false};
+};
+
 /// What a model may be judged by.
 struct GateData {
-  std::vector<GateRows> rows{};  ///< the first that can judge both models does
-  bool believe_manifest{true};   ///< where none can; never of a model from elsewhere
+  std::vector<GateRows> rows{};      ///< the first that can judge both models does
+  bool believe_manifest{true};       ///< where none can; never of a model from elsewhere
+  const DatasetTable* own{nullptr};  ///< what the candidate was trained on, where that is kept
+  ActivePlaces active{};
 };
 
 /// A model takes over by default only where it does not worsen what it replaces: FPR of an identification,
 /// MAE of a correction; and it must help at all: a correction beside none, a class beside always saying the
 /// same. Both are measured on the same rows, those that have the features of both; two that were never
-/// measured on the same rows fail. What a manifest claims counts only of models made here: one from
-/// elsewhere that no kept row can judge fails. So does one that was not trained on single ranges. Only a
-/// person's reason lets a model pass that fails.
+/// measured on the same rows fail. It must be no worse on the places of the active model either: those
+/// that its run held out, else those it was trained on, against its out-of-fold figures; where these are not
+/// kept or have no row for both, it fails and says so. So does one whose training rows no radio measures
+/// (ml::plausible_range), or whose usual correction could never be applied. What a manifest claims counts
+/// only of models made here: one from elsewhere that no kept row can judge fails. So does one that was not
+/// trained on single ranges. Only a person's reason lets a model pass that fails.
 GateReport gate_of(const ml::Model& candidate, const ml::Model* current, const GateData& data);
 
 }  // namespace anchord::api

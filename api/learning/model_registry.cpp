@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cstdio>
 
 #include "api/learning/model_artifact.hpp"
 #include "api/learning/range_features.hpp"
@@ -154,7 +155,9 @@ ModelAnswer ModelRegistry::predict(const Active& active, const nlos::FeatureVect
   }
   out.verdict = active.predictor.predict(features, active.correction);
   out.models = models_of(active, out.verdict);
-  if (!out.verdict.p_los && !out.verdict.bias_m) {
+  if (out.verdict.withheld_m) {
+    out.note = withheld_words(out.verdict);
+  } else if (!out.verdict.p_los && !out.verdict.bias_m) {
     std::string lacking;
     const auto& set = active.predictor.models();
     for (const auto& model : {set.nlos_id, set.los_bias, set.nlos_bias, set.bias})
@@ -167,14 +170,22 @@ ModelAnswer ModelRegistry::predict(const Active& active, const nlos::FeatureVect
 std::optional<RangeModel> predict_range(const ModelRegistry::Active& active, const Range& range) {
   if (active.predictor.empty() || range.kind != RangeKind::tag_anchor) return std::nullopt;
   const auto verdict = active.predictor.predict(features_of(range, false), active.correction);
-  if (!verdict.p_los && !verdict.bias_m) return std::nullopt;
+  if (!verdict.p_los && !verdict.bias_m && !verdict.withheld_m) return std::nullopt;
   return RangeModel{verdict.los,
                     verdict.p_los,
                     verdict.bias_m,
                     verdict.sigma_m,
                     verdict.outside_training,
+                    ml::why_withheld(verdict.withheld),
                     error_model_of(verdict, active.correction),
                     models_of(active, verdict)};
+}
+
+std::string withheld_words(const ml::RangePrediction& verdict) {
+  char metres[40];
+  std::snprintf(metres, sizeof metres, "%.2f m", verdict.withheld_m.value_or(0));
+  return "the correction of " + std::string(metres) +
+         " is withheld: " + std::string(ml::why_withheld(verdict.withheld));
 }
 
 RangeModels models_of(const ModelRegistry::Active& active, const ml::RangePrediction& verdict) {

@@ -21,7 +21,8 @@ namespace anchord::api {
 struct ModelAnswer {
   ml::RangePrediction verdict{};
   RangeModels models{};
-  std::string note;  ///< empty when classified: "no model is promoted", "lacks std_noise ..."
+  /// Empty when classified: "no model is promoted", "lacks std_noise ...", or that a correction is withheld.
+  std::string note;
 };
 
 /// Which models are active, ready for use. Thread-safe: a promotion takes effect at the next range judged.
@@ -54,6 +55,9 @@ class ModelRegistry {
   std::mutex reloading_;  ///< one at a time, or the slower of two promotions leaves the older state in use
   Locked<std::shared_ptr<const Active>> active_;
 };
+
+/// A correction that is not given, and why.
+std::string withheld_words(const ml::RangePrediction& verdict);
 
 /// In the form a flight keeps with the range. Nothing where the models say nothing.
 std::optional<RangeModel> predict_range(const ModelRegistry::Active& active, const Range& range);

@@ -95,7 +95,7 @@ Response upload(LearningApi& l, const Request& request) {
     throw_problem(422, "validation", read.error().message, {{"", "bad_model", read.error().message}});
   const auto& model = read.value();
   // What is kept is what we understood, not what was sent.
-  const std::string artifact = write_model_artifact(model);
+  const std::string artifact = value_or_problem(checked_model_artifact(model));
   StoredModel stored;
   stored.task = ml::task_name(model.info.task);
   stored.method = model.info.method;
@@ -199,18 +199,23 @@ Response patch_active(LearningApi& l, const Request& request) {
   return active_answer(l);
 }
 
-std::optional<ml::Model> active_model(LearningApi& l, const Standing& now, const std::string& task) {
+struct ActiveModel {
+  ml::Model model;
+  ModelStanding standing{};
+};
+
+std::optional<ActiveModel> active_model(LearningApi& l, const Standing& now, const std::string& task) {
   const auto at = now.models.find(task);
   if (at == now.models.end()) return std::nullopt;
   const auto artifact = l.models.source().artifact(at->second);
   if (!artifact) return std::nullopt;  // it was edited: it is not in use, and nothing is measured against it
   auto model = read_model_artifact(artifact.value().text);
   if (!model) return std::nullopt;
-  return std::move(model).value();
+  return ActiveModel{std::move(model).value(), artifact.value().standing};
 }
 
 /// Made here: by the places its own run held out, else by what this server keeps, else its own figures. From
-/// elsewhere: by what this server keeps.
+/// elsewhere: by what this server keeps. Either on the places of the active model too.
 GateReport gate_report(LearningApi& l, const Standing& now, const ModelSource::Artifact& candidate) {
   const auto model = value_or_problem(read_model_artifact(candidate.text));
   const auto current = active_model(l, now, candidate.stored.task);
@@ -222,9 +227,15 @@ GateReport gate_report(LearningApi& l, const Standing& now, const ModelSource::A
     if (auto parsed = DatasetTable::parse(value_or_problem(l.stores.datasets.csv(run.dataset)))) {
       own = std::move(parsed).value();
       data.rows.push_back({&own, "held_out", 1});
+      data.own = &own;
     }
   }
-  const ml::Model* active = current ? &*current : nullptr;
+  const ml::Model* active = current ? &current->model : nullptr;
+  std::optional<DatasetTable> places;
+  if (active != nullptr && active->info.data_digest != model.info.data_digest) {
+    places = value_or_problem(table_of_digest(l.stores.datasets, active->info.data_digest));
+    data.active = {true, places ? &*places : nullptr, current->standing == ModelStanding::made};
+  }
   auto report = gate_of(model, active, data);
   const bool measured =
       std::ranges::any_of(report.checks, [](const GateCheck& check) { return check.basis == "held_out"; });

@@ -37,7 +37,8 @@ Result<std::string> train_work(const Json& message, const std::stop_token& stop,
   info.data_digest = dataset_digest(csv);
   info.not_for_live = not_for_live(table);
   auto parts = training_parts(outcome, table, rows);
-  nlohmann::ordered_json out{{"artifact", write_model_artifact(outcome.model)}};
+  BOOST_OUTCOME_TRY(auto artifact, checked_model_artifact(outcome.model));
+  nlohmann::ordered_json out{{"artifact", std::move(artifact)}};
   out["summary"] = std::move(parts.at("summary"));
   parts.erase("summary");
   out["parts"] = std::move(parts);

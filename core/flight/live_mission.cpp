@@ -43,6 +43,7 @@ void LiveMission::add(const PredictedRange& judged) {
   state_.range_rate_hz = span_s > 0 ? static_cast<double>(range_times_us_.size() - 1) / span_s : 0;
   watch_.note_range(range.time);
   if (excluded(setup_.exclusions, range)) return live_.leave_out(range);
+  if (judged.model) watch_.note_model(judged.model->withheld);
   history_.add(corrected(judged), error_model_of(judged));
   ++ranges_since_joint_;
   live_.add(range, judged.model);
@@ -107,6 +108,7 @@ void LiveMission::announce_estimate(Estimate estimate) {
   if (changed && !reading_ && (status == "converged" || status == "ambiguous"))
     events_.emplace_back(AnchorStatusChanged{estimate.anchor, status, estimate.reason});
   const auto moved_m = live_.uncorrected_shift_m(estimate.anchor);
+  watch_.note_moved(estimate.anchor, moved_m, estimate.h95_m);
   events_.emplace_back(AnchorEstimated{std::move(estimate), moved_m});
 }
 

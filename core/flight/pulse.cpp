@@ -4,6 +4,10 @@ namespace anchord::flight {
 namespace {
 
 constexpr std::size_t k_looks = 10;
+// One range in five of the newest fifty: single odd ones are what withholding is for.
+constexpr std::size_t k_judged = 50, k_many_withheld = 10;
+// A wall moves no anchor by more, and no anchor so far that its own uncertainty could.
+constexpr double k_moved_m = 3, k_moved_h95 = 3;
 
 }  // namespace
 
@@ -29,6 +33,31 @@ void FlightWatch::note_range(UtcTime measured) {
 void FlightWatch::note_lag(double lag_s, double sigma_s) {
   pulse_.lag_s = lag_s;
   pulse_.lag_sigma_s = sigma_s;
+}
+
+void FlightWatch::note_model(std::string_view withheld) {
+  withheld_.push_back(withheld);
+  if (withheld_.size() > k_judged) withheld_.pop_front();
+  std::size_t n = 0;
+  std::string_view why;
+  for (const auto& one : withheld_) {
+    if (one.empty()) continue;
+    ++n;
+    why = one;
+  }
+  pulse_.models_withheld = n >= k_many_withheld ? why : std::string_view{};
+}
+
+void FlightWatch::note_moved(NetworkId anchor, std::optional<double> moved_m, double h95_m) {
+  const bool far = moved_m && *moved_m > k_moved_m && *moved_m > k_moved_h95 * h95_m;
+  if (far == moved_.contains(anchor)) return;
+  if (far)
+    moved_.insert(anchor);
+  else
+    moved_.erase(anchor);
+  pulse_.models_moved.clear();
+  for (const auto id : moved_)
+    pulse_.models_moved += (pulse_.models_moved.empty() ? "" : ", ") + to_string(id);
 }
 
 FlightPulse FlightWatch::look(UtcTime newest_measured, Steady now) {

@@ -3,7 +3,9 @@
 #include <chrono>
 #include <deque>
 #include <optional>
+#include <set>
 #include <string>
+#include <string_view>
 #include <utility>
 
 #include "core/base/ids.hpp"
@@ -25,6 +27,8 @@ struct FlightPulse {
   std::optional<UtcTime> below_float_since{}, float_since{};  ///< measured; absent while it is better
   std::optional<double> correction_age_s{};                   ///< of the newest fix, where it says
   std::optional<double> lag_s{}, lag_sigma_s{};               ///< of the joint solution
+  std::string_view models_withheld{};  ///< why the models' corrections are not applied, while many are not
+  std::string models_moved{};          ///< anchors that the models move by metres
   bool as_it_happens{false};  ///< rows come about as fast as they were measured: no upload, no fast replay
 };
 
@@ -35,6 +39,10 @@ class FlightWatch {
   void note(const Fix& fix);
   void note_range(UtcTime measured);
   void note_lag(double lag_s, double sigma_s);
+  /// A range that models judged; `withheld`: why their correction was not applied, empty where it was.
+  void note_model(std::string_view withheld);
+  /// How far the models move an anchor whose position is known to `h95_m`.
+  void note_moved(NetworkId anchor, std::optional<double> moved_m, double h95_m);
   /// The flight as it stands. Call it about once a second: a flight counts as happening now once ten looks
   /// saw its measured time pass about as fast as ours, and no longer when it runs ahead (an upload, a fast
   /// replay). One that falls silent stays what it was: silence is what the alarms are about.
@@ -43,6 +51,8 @@ class FlightWatch {
  private:
   FlightPulse pulse_;
   std::deque<std::pair<UtcTime, Steady>> looks_;
+  std::deque<std::string_view> withheld_;  ///< of the newest ranges that models judged
+  std::set<NetworkId> moved_;
 };
 
 }  // namespace anchord::flight

@@ -34,6 +34,16 @@ struct BiasMixture {
   std::vector<TailTerm> tail{};  ///< a1, a2
   double quantile{0.5};          ///< which quantile corrects
   double gain{1};                ///< share of the correction that is applied
+  struct Seen {
+    double min_m{}, max_m{};
+  };
+  std::optional<Seen> seen{};  ///< biases of the training rows; absent: a model of an older program
+
+  /// More than the whole span of what was seen beyond it: a tail that ran away.
+  bool far_beyond_seen(double bias_m) const {
+    const double span_m = seen ? seen->max_m - seen->min_m : 0;
+    return seen && (bias_m > seen->max_m + span_m || bias_m < seen->min_m - span_m);
+  }
 
   /// What to subtract from the measured range: gain times the quantile.
   double correction_m(const BiasDensity& density) const;

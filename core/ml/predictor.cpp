@@ -76,25 +76,24 @@ bool Predictor::gather(const Slot& slot, const nlos::FeatureVector& features, st
   return true;
 }
 
-RangePrediction Predictor::predict(const nlos::FeatureVector& features, Correction how) const {
-  RangePrediction out;
+/// The bias of the models that have the range's features, and whether the range is like those they learned
+/// of.
+void Predictor::correct(const nlos::FeatureVector& features, Correction how, RangePrediction& out) const {
   std::array<double, k_max_features> x;
-  // Class: the identification model, else the classifier inside the bias model.
-  for (const Slot* slot : {&nlos_id_, &bias_}) {
-    if (out.p_los || slot->model == nullptr || !slot->model->classifier) continue;
-    if (!gather(*slot, features, x)) continue;
-    out.p_los = slot->model->classifier->p_los(x);
-    out.los = *out.p_los >= slot->model->classifier->threshold;
-    out.outside_training = furthest_sd(slot->model->classifier->scaler, x) > k_outside_sd;
-    out.spoke.set(bit(slot == &bias_ ? Task::bias : Task::nlos_id));
-  }
+  const auto far_off = [&](const Scaler& scaler) {
+    const double sd = furthest_sd(scaler, x);
+    out.outside_training |= sd > k_outside_sd;
+    return sd > k_far_sd;
+  };
   struct OneClass {
     double bias_m{}, sigma_m{};
+    bool far{};
   };
+  bool far = false;
   const auto one_class = [&](const Slot& slot) -> std::optional<OneClass> {
     if (slot.model == nullptr || !slot.model->regressor || !gather(slot, features, x)) return std::nullopt;
-    out.outside_training |= furthest_sd(slot.model->regressor->scaler, x) > k_outside_sd;
-    return OneClass{slot.model->regressor->bias_m(x), slot.model->regressor->sigma_m};
+    return OneClass{slot.model->regressor->bias_m(x), slot.model->regressor->sigma_m,
+                    far_off(slot.model->regressor->scaler)};
   };
   const auto los = one_class(los_bias_), nlos = one_class(nlos_bias_);
   if (out.p_los && los && nlos) {
@@ -108,6 +107,7 @@ RangePrediction Predictor::predict(const nlos::FeatureVector& features, Correcti
     out.bias_m = mean;
     out.sigma_m = std::sqrt(std::max(1e-6, second - mean * mean));
     out.spoke.set(bit(Task::los_bias)).set(bit(Task::nlos_bias));
+    far = los->far || nlos->far;
   } else if (const auto* m = bias_.model; m != nullptr && gather(bias_, features, x)) {
     out.spoke.set(bit(Task::bias));
     if (m->mixture && m->classifier) {
@@ -122,17 +122,50 @@ RangePrediction Predictor::predict(const nlos::FeatureVector& features, Correcti
         out.bias_m = m->mixture->correction_m(density);
       }
       out.sigma_m = density.sigma_m();
+      far = far_off(m->classifier->scaler);
+      if (m->mixture->far_beyond_seen(*out.bias_m)) out.withheld = Withheld::unseen_bias;
     } else if (m->regressor) {
       out.bias_m = m->regressor->bias_m(x);
       out.sigma_m = m->regressor->sigma_m;
-      out.outside_training |= furthest_sd(m->regressor->scaler, x) > k_outside_sd;
+      far = far_off(m->regressor->scaler);
     }
   } else if (los && !nlos_bias_.model) {
     out.spoke.set(bit(Task::los_bias));
     out.bias_m = out.p_los ? *out.p_los * los->bias_m : los->bias_m;
     out.sigma_m = los->sigma_m;
+    far = los->far;
   }
-  if (how == Correction::none) out.bias_m = 0;
+  if (far) out.withheld = Withheld::far_features;
+}
+
+RangePrediction Predictor::predict(const nlos::FeatureVector& features, Correction how) const {
+  RangePrediction out;
+  std::array<double, k_max_features> x;
+  // Class: the identification model, else the classifier inside the bias model.
+  for (const Slot* slot : {&nlos_id_, &bias_}) {
+    if (out.p_los || slot->model == nullptr || !slot->model->classifier) continue;
+    if (!gather(*slot, features, x)) continue;
+    out.p_los = slot->model->classifier->p_los(x);
+    out.los = *out.p_los >= slot->model->classifier->threshold;
+    out.outside_training = furthest_sd(slot->model->classifier->scaler, x) > k_outside_sd;
+    out.spoke.set(bit(slot == &bias_ ? Task::bias : Task::nlos_id));
+  }
+  const auto gave_class = out.spoke;
+  correct(features, how, out);
+  if (how == Correction::none) {
+    out.withheld = Withheld::no;
+    if (out.bias_m) out.bias_m = 0;
+    return out;
+  }
+  const auto range_m = features.get(nlos::Feature::range_m);
+  if (out.withheld == Withheld::no && out.bias_m && range_m && !plausible_correction(*range_m, *out.bias_m))
+    out.withheld = Withheld::implausible;
+  if (out.withheld == Withheld::no) return out;
+  out.withheld_m = out.bias_m;
+  out.spoke = gave_class;
+  out.bias_m.reset();
+  out.sigma_m.reset();
+  out.likelihood.reset();
   return out;
 }
 

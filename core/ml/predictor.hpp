@@ -7,6 +7,7 @@
 
 #include "core/base/result.hpp"
 #include "core/ml/model.hpp"
+#include "core/ml/plausible.hpp"
 #include "core/nlos/features.hpp"
 
 /// The live path's view of the promoted models: diagnostics of a range in, what the estimator needs out.
@@ -40,6 +41,8 @@ struct RangePrediction {
   std::optional<RangeLikelihood> likelihood{};
   std::bitset<4> spoke{};   ///< by Task: the models that gave the class or the bias
   bool outside_training{};  ///< a feature lies beyond 3 sd of the training rows: the correction was shrunk
+  Withheld withheld{Withheld::no};     ///< a correction was computed and is not given: then no bias_m,
+  std::optional<double> withheld_m{};  ///< no sigma_m and no likelihood; what it was
 };
 
 /// The models promoted together; each may be absent. A `bias` model of both classes (mixture) stands in for
@@ -71,6 +74,7 @@ class Predictor {
   Slot nlos_id_{}, los_bias_{}, nlos_bias_{}, bias_{};
 
   static Result<Slot> slot_of(const Model* model, Task first, Task other);
+  void correct(const nlos::FeatureVector& features, Correction how, RangePrediction& out) const;
   static bool gather(const Slot& slot, const nlos::FeatureVector& features, std::span<double> out);
 };
 

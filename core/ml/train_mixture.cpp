@@ -164,6 +164,8 @@ Result<BiasMixture> fit_mixture(const MixtureTask& task) {
   auto best = minimise(loss, start, 0.3, 400);
   best = minimise(loss, best, 0.1, 400);  // a fresh simplex: the first may have collapsed early
   unpack(best);
+  const auto [least, most] = std::minmax_element(task.bias_m.begin(), task.bias_m.end());
+  m.seen = BiasMixture::Seen{*least, *most};
   return m;
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <optional>
+#include <string_view>
 
 #include "core/base/ids.hpp"
 #include "core/types/range_error_model.hpp"
@@ -19,6 +20,7 @@ struct RangeModel {
   std::optional<double> bias_m{};   ///< subtract it from the distance
   std::optional<double> sigma_m{};  ///< of what is left
   bool outside_training{false};
+  std::string_view withheld{};  ///< why a correction that was computed is not given (ml::why_withheld)
   std::optional<RangeErrorModel> error_model{};  ///< of the error that is left once bias_m is off
   RangeModels models{};
 };

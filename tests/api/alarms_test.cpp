@@ -94,6 +94,31 @@ TEST(AlarmRules, CallClocksThatDifferBeyondDoubt) {
   EXPECT_EQ(raised(f), "") << "within what the flight can tell";
 }
 
+TEST(AlarmRules, CallCorrectionsThatAreNotAppliedAndAnchorsThatModelsMove) {
+  auto f = well();
+  flight::FlightWatch watch;
+  const NetworkId anchor{0x6001};
+  const auto take = [&] {
+    const auto now = watch.look(at(100), flight::FlightWatch::Steady{});
+    f.models_withheld = now.models_withheld;
+    f.models_moved = now.models_moved;
+  };
+  for (int i = 0; i < 9; ++i) watch.note_model("it is of another unit");
+  watch.note_moved(anchor, 2.9, 0.1);
+  watch.note_moved(NetworkId{0x6002}, 28, 15);
+  take();
+  EXPECT_EQ(raised(f), "") << "nine odd ranges, and a position that nobody knows yet";
+  watch.note_model("it is of another unit");
+  watch.note_moved(anchor, 28, 0.4);
+  take();
+  EXPECT_EQ(raised(f), "model.withheld model.moved");
+  EXPECT_NE(api::alarm_conditions({f}, {})[1].text.find("0x6001"), std::string::npos);
+  for (int i = 0; i < 50; ++i) watch.note_model("");
+  watch.note_moved(anchor, std::nullopt, 0.4);
+  take();
+  EXPECT_EQ(raised(f), "");
+}
+
 TEST(AlarmRules, SayNothingOfUploads) {
   auto f = well();
   f.below_float_since = at(0);

@@ -4,6 +4,7 @@
 #include "api/kit/contract.hpp"
 #include "api/scope/route_sites.hpp"
 #include "core/ports/access_store.hpp"
+#include "core/ports/learning_store.hpp"
 #include "site_tokens_fixture.hpp"
 
 namespace anchord::test::site_tokens_test {
@@ -302,6 +303,26 @@ TEST_P(SiteTokenRoutes, NothingIsWrittenOfOrIntoAnotherSite) {
                    {{"against", alpha_.id("calibration")}})
                 .status,
             404);
+}
+
+// Models are of the whole server, which a bound token does not see: a calibration must not tell which there
+// are.
+TEST_P(SiteTokenRoutes, AModelThatIsThereIsAnsweredAsOneThatNeverWas) {
+  StoredModel model;
+  model.id.uuid = make_uuid_v7(clock_.now());
+  model.task = "los_bias";
+  model.method = "constant";
+  model.manifest = {"{}"};
+  model.created = clock_.now();
+  ASSERT_TRUE(database_->stores().models.insert(model, "{}").has_value());
+  const auto asked = [&](const ModelId& id) {
+    return post_as(bravo_, "/api/v1/calibrations",
+                   {{"missions", {bravo_.id("mission")}}, {"models", {{"los_bias", to_string(id)}}}});
+  };
+  const auto there = asked(model.id), never = asked(ModelId{make_uuid_v7(clock_.now())});
+  EXPECT_EQ(there.status, never.status) << there.body;
+  EXPECT_EQ(generic(there.body), generic(never.body));
+  EXPECT_EQ(never.status, 422) << never.body;
 }
 
 TEST_P(SiteTokenRoutes, WhatIsMadeWithoutASiteIsOfTheOneThatTheTokenIsBoundTo) {

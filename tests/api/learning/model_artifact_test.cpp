@@ -136,4 +136,26 @@ TEST(ModelArtifact, KeepsTheBiasMixture) {
   EXPECT_EQ(ml::predict(model, x).sigma_m, ml::predict(again.value(), x).sigma_m);
 }
 
+// A delay that nobody took off: the reader takes no bias beyond 100 m, and so no writer may keep one.
+TEST(ModelArtifact, WhatItsOwnReaderRefusesIsNotKept) {
+  auto model = model_of(ml::Method::logistic);
+  EXPECT_EQ(checked_model_artifact(model).value(), write_model_artifact(model));
+  model.info.task = ml::Task::bias;
+  model.mixture.emplace();
+  model.mixture->shared.centre_m = 154;
+  const auto refused = checked_model_artifact(model);
+  ASSERT_FALSE(refused);
+  EXPECT_NE(refused.error().message.find("/mixture/shared/centre_m: out of range: 154, may be -100 to 100"),
+            std::string::npos)
+      << refused.error().message;
+  model.mixture->shared.centre_m = 0.5;
+  model.info.metrics = {{"mae_m", std::nan("")}};
+  EXPECT_FALSE(checked_model_artifact(model));
+  model.info.metrics.clear();
+  model.mixture->seen = ml::BiasMixture::Seen{-0.1, 2.5};
+  const auto kept = read_model_artifact(checked_model_artifact(model).value());
+  ASSERT_TRUE(kept) << kept.error().message;
+  EXPECT_EQ(kept.value().mixture->seen->max_m, 2.5);
+}
+
 }  // namespace anchord::api::model_artifact_test

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "api/learning/range_features.hpp"
 
 namespace anchord::api::model_gate_test {
@@ -25,19 +27,25 @@ ml::Model correction(double bias_m, const std::string& digest, double claimed_ma
   return m;
 }
 
-/// LOS ranges 0.10 m too long, each a row that stands for `repeats` rangings.
-DatasetTable long_by_ten_centimetres(std::size_t n, std::size_t repeats) {
+/// LOS ranges `bias_m` too long, each a row that stands for `repeats` rangings.
+DatasetTable long_by(double bias_m, std::size_t n, std::size_t repeats, bool test = true) {
   DatasetTable out;
   for (std::size_t i = 0; i < n; ++i) {
     DatasetRow row;
     row.campaign = "c", row.environment = "room", row.setting = "s" + std::to_string(i);
-    row.test = true, row.los = true, row.repeats = repeats;
+    row.test = test, row.los = true, row.repeats = repeats;
     row.true_range_m = 3.0 + static_cast<double>(i);
-    row.features.set(Feature::range_m, *row.true_range_m + 0.10);
+    row.features.set(Feature::range_m, *row.true_range_m + bias_m);
     if (i % 2 == 0) row.features.set(Feature::fp_dbm, -80);
     out.rows.push_back(std::move(row));
   }
   return out;
+}
+DatasetTable long_by_ten_centimetres(std::size_t n, std::size_t repeats) { return long_by(0.10, n, repeats); }
+
+const GateCheck* check_on(const GateReport& report, const std::string& basis) {
+  const auto at = std::ranges::find(report.checks, basis, &GateCheck::basis);
+  return at == report.checks.end() ? nullptr : &*at;
 }
 
 }  // namespace
@@ -96,6 +104,67 @@ TEST(ModelGate, FiguresOfDifferentRowsAreNotCompared) {
   // The same rows and folds can.
   EXPECT_TRUE(gate_of(correction(0.09, "a", 0.01), &older, {{}, true}).passed);
   EXPECT_FALSE(gate_of(correction(0.09, "a", 0.06), &older, {{}, true}).passed);
+}
+
+// In the odd room every range is 0.60 m too long: whoever learned there is right there, and half a metre off
+// at home.
+TEST(ModelGate, RefusesACandidateThatIsWorseOnThePlacesOfTheActiveModel) {
+  const auto odd = long_by(0.60, 20, 1), home = long_by_ten_centimetres(20, 1);
+  const auto candidate = correction(0.60, "odd", 0.01), active = correction(0.09, "home", 0.02);
+  GateData data{{{&odd, "held_out", 1}}, true, &odd, {true, &home, true}};
+  const auto report = gate_of(candidate, &active, data);
+  EXPECT_FALSE(report.passed);
+  const auto* there = check_on(report, "active_places");
+  ASSERT_NE(there, nullptr) << report.why;
+  EXPECT_NEAR(*there->candidate, 0.50, 1e-9);
+  EXPECT_NEAR(*there->current, 0.01, 1e-9);
+  EXPECT_NE(
+      report.why.find("0.5000 is worse than the 0.0100 of the active model on the places of the active"),
+      std::string::npos)
+      << report.why;
+  EXPECT_TRUE(gate_of(correction(0.10, "odd too", 0.01), &active,
+                      {{{&home, "held_out", 1}}, true, nullptr, {true, &home, true}})
+                  .passed);
+}
+
+// Nothing was held out there: the rows the active one learned from, against its out-of-fold figure.
+TEST(ModelGate, TakesTheActiveModelsOutOfFoldFiguresWhereItHeldNothingOut) {
+  const auto odd = long_by(0.60, 20, 1), home = long_by(0.10, 20, 1, false);
+  const auto active = correction(0.09, "home", 0.02);
+  const auto report = gate_of(correction(0.60, "odd", 0.01), &active,
+                              {{{&odd, "held_out", 1}}, true, nullptr, {true, &home, true}});
+  const auto* there = check_on(report, "active_places");
+  ASSERT_NE(there, nullptr) << report.why;
+  EXPECT_FALSE(there->passed);
+  EXPECT_NEAR(*there->candidate, 0.50, 1e-9);
+  EXPECT_EQ(*there->current, 0.02) << "what its manifest says of these rows";
+}
+
+TEST(ModelGate, SaysWhereNothingTellsHowACandidateDoesOnThePlacesOfTheActiveModel) {
+  const auto rows = long_by_ten_centimetres(20, 1);
+  const auto active = correction(0.08, "home", 0.02);
+  const auto report = gate_of(correction(0.10, "a", 0.01), &active,
+                              {{{&rows, "held_out", 1}}, true, nullptr, {true, nullptr, true}});
+  EXPECT_FALSE(report.passed);
+  EXPECT_NE(report.why.find("the data that one was trained on are not kept here"), std::string::npos)
+      << report.why;
+}
+
+// Light takes 3.3356 ns for a metre.
+TEST(ModelGate, RefusesAModelOfRangesInNanoseconds) {
+  auto nanoseconds = long_by(0, 20, 1);
+  for (auto& row : nanoseconds.rows) row.features.set(Feature::range_m, *row.true_range_m * 3.3356 + 0.1);
+  const auto report = gate_of(correction(9.0, "ns", 0.01), nullptr,
+                              {{{&nanoseconds, "held_out", 1}}, true, &nanoseconds, {}});
+  EXPECT_FALSE(report.passed);
+  EXPECT_NE(report.why.find("20 of the 20 rows it was trained on are no ranges of a radio in metres"),
+            std::string::npos)
+      << report.why;
+  // So is one that says of itself what no radio does, wherever it comes from.
+  const auto far = long_by(30, 20, 1);
+  const auto claims = gate_of(correction(30, "b", 0.01), nullptr, {{{&far, "kept_data", 1}}, false});
+  EXPECT_FALSE(claims.passed);
+  EXPECT_NE(claims.why.find("its usual correction is 30.0000 m"), std::string::npos) << claims.why;
 }
 
 }  // namespace anchord::api::model_gate_test

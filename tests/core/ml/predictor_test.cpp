@@ -120,4 +120,61 @@ TEST(Predictor, MarksSamplesOutsideTheTrainingRows) {
   EXPECT_TRUE(made.value().predict(sample(3.1)).outside_training);
 }
 
+// 23 m is what ranges in nanoseconds, read as metres, teach a model of ten-metre rooms.
+TEST(Predictor, WithholdsACorrectionThatNoRadioNeeds) {
+  const auto made = Predictor::make({{}, {}, {}, constant_bias(Task::bias, 23, 1)});
+  ASSERT_TRUE(made);
+  FeatureVector f;
+  f.set(Feature::range_m, 0.5);
+  const auto v = made.value().predict(f);
+  EXPECT_FALSE(v.bias_m);
+  EXPECT_FALSE(v.sigma_m);
+  EXPECT_EQ(v.withheld, Withheld::implausible);
+  EXPECT_EQ(v.withheld_m, 23);
+  EXPECT_TRUE(v.spoke.none()) << "it gave nothing";
+  // Short ranges may be late by more than their length.
+  const auto wall = Predictor::make({{}, {}, {}, constant_bias(Task::bias, 1.2, 1)});
+  EXPECT_EQ(wall.value().predict(f).bias_m, 1.2);
+  EXPECT_TRUE(plausible_correction(30, 9));
+  EXPECT_FALSE(plausible_correction(30, 11));
+  EXPECT_FALSE(plausible_correction(6, 3.5)) << "more than half of the range";
+  EXPECT_FALSE(plausible_correction(3, -4)) << "more than twice as far";
+}
+
+// The scaler is of mean 0 and sd 1: 11 m is 11 sd away.
+TEST(Predictor, WithholdsTheCorrectionOfARangeFarFromTheTrainingRows) {
+  const auto made = Predictor::make({{}, {}, {}, constant_bias(Task::bias, 0.3, 0.1)});
+  ASSERT_TRUE(made);
+  FeatureVector f;
+  f.set(Feature::range_m, 9.9);
+  EXPECT_EQ(made.value().predict(f).bias_m, 0.3);
+  f.set(Feature::range_m, 11);
+  const auto v = made.value().predict(f);
+  EXPECT_FALSE(v.bias_m);
+  EXPECT_EQ(v.withheld, Withheld::far_features);
+  EXPECT_TRUE(v.outside_training);
+  EXPECT_EQ(made.value().predict(f, Correction::none).withheld, Withheld::no) << "nothing was to be applied";
+}
+
+TEST(Predictor, WithholdsACorrectionFarBeyondTheBiasesOfTheTraining) {
+  auto m = classifier();
+  m->info.task = Task::bias;
+  m->mixture.emplace();
+  m->mixture->m1_m = 5, m->mixture->m0_m = 5;
+  const auto with = [&](std::optional<BiasMixture::Seen> seen) {
+    m->mixture->seen = seen;
+    return Predictor::make({{}, {}, {}, m}).value().predict([] {
+      auto f = sample(0);
+      f.set(Feature::range_m, 20);
+      return f;
+    }());
+  };
+  EXPECT_TRUE(with(std::nullopt).bias_m) << "a model of an older program does not say what it saw";
+  EXPECT_TRUE(with(BiasMixture::Seen{0, 3}).bias_m);
+  const auto far = with(BiasMixture::Seen{0, 1});
+  EXPECT_FALSE(far.bias_m);
+  EXPECT_EQ(far.withheld, Withheld::unseen_bias);
+  EXPECT_TRUE(far.p_los) << "the class is another matter";
+}
+
 }  // namespace anchord::ml::predictor_test
