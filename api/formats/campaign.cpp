@@ -8,10 +8,14 @@
 #include <functional>
 #include <nlohmann/json.hpp>
 
+#include "api/formats/campaign_text.hpp"
 #include "api/formats/cells.hpp"
 #include "api/formats/column_names.hpp"
 #include "api/formats/csv_record.hpp"
+#include "api/formats/names_alike.hpp"
+#include "api/formats/text_decoding.hpp"
 #include "api/kit/reader.hpp"
+#include "api/wire/row_limits.hpp"
 #include "api/wire/rows_json.hpp"
 #include "core/base/text.hpp"
 #include "core/base/to_wire.hpp"
@@ -22,7 +26,7 @@ namespace {
 
 using namespace columns;
 constexpr std::size_t k_most_errors = 100;
-constexpr double k_furthest_m = 10'000;
+constexpr double k_furthest_m = row_limits::k_campaign_range_m.max;
 
 // Names of the hand-measured truth; a column of measured ranges may be called distance_m only where another
 // column is the truth.
@@ -80,13 +84,19 @@ class Importer {
 
   Result<CampaignImport> run(std::string_view text) {
     if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);
+    if (text.find('\0') != std::string_view::npos)
+      return make_error(Errc::bad_frame,
+                        "no text: it has bytes of zero in it (UTF-16 without its mark?); save it as UTF-8");
     out_.report.format = options_.format == CampaignFormat::detect ? detect(text) : options_.format;
     std::size_t line = 0;
     while (!text.empty()) {
       const auto end = text.find('\n');
-      const auto one = trimmed(text.substr(0, end));
+      auto one = text.substr(0, end);
       text.remove_prefix(end == std::string_view::npos ? text.size() : end + 1);
       ++line;
+      if (one.ends_with('\r')) one.remove_suffix(1);
+      // A tab at the end of a table's line is an empty cell.
+      if (out_.report.format != CampaignFormat::csv || trimmed(one).empty()) one = trimmed(one);
       if (!one.empty()) take_line(one, line);
       if (fatal_) return *fatal_;
     }
@@ -104,12 +114,8 @@ class Importer {
       text.remove_prefix(end == std::string_view::npos ? text.size() : end + 1);
       if (line.empty() || line.front() == '#') continue;
       if (line.front() == '{') return CampaignFormat::ndjson;
-      // A header has a name of ranges in it, a .txt only measurements.
-      for (const auto& names : {k_measured, k_measured_mm, k_range})
-        for (const auto name : names)
-          if (name.find('_') != std::string_view::npos && line.find(name) != std::string_view::npos)
-            return CampaignFormat::csv;
-      return CampaignFormat::txt;
+      // What has any other word in it is a header, and must then have a column of ranges.
+      return is_campaign_line(line) ? CampaignFormat::txt : CampaignFormat::csv;
     }
     return CampaignFormat::txt;
   }
@@ -145,7 +151,12 @@ class Importer {
   }
 
   void take_csv(std::string_view line, std::size_t at) {
-    if (header_.empty()) separator_ = separator_of(line);
+    if (header_.empty() && line.starts_with("sep=") && line.size() == 5) {  // of Excel, above the header
+      separator_ = line[4];
+      separator_told_ = true;
+      return;
+    }
+    if (header_.empty() && !separator_told_) separator_ = separator_of(line);
     CsvRecord record({separator_});
     const auto read = record.read(line);
     const auto& cells = record.cells();
@@ -153,6 +164,7 @@ class Importer {
       if (!read)
         fatal_ = make_error(Errc::bad_frame, "line " + std::to_string(at) + ": " + read.error().message);
       header_.assign(cells.begin(), cells.end());
+      if (!fatal_) fatal_ = fault_of_header(at);
       return;
     }
     ++out_.report.lines;
@@ -164,6 +176,29 @@ class Importer {
     take_row(row, at);
   }
 
+  std::optional<Error> fault_of_header(std::size_t at) const {
+    const std::string line = "line " + std::to_string(at) + ": ";
+    for (auto name = header_.begin(); name != header_.end(); ++name)
+      if (!name->empty() && std::find(header_.begin(), name, *name) != name)
+        return make_error(Errc::invalid_argument,
+                          line + "two columns are named " + in_quotes(*name) + ": rename or remove one");
+    const auto has = [this](const Names& names) {
+      return std::ranges::any_of(
+          names, [this](auto name) { return std::ranges::find(header_, name) != header_.end(); });
+    };
+    if (has(k_measured) || has(k_measured_mm) || (has(k_campaign_truth) && has({"distance_m", "distance"})))
+      return std::nullopt;
+    std::string columns;
+    for (const auto& name : header_) columns += (columns.empty() ? "" : ", ") + in_quotes(name);
+    return make_error(
+        Errc::invalid_argument,
+        line + "no column of measured ranges (range_m, or range_mm for millimetres); read with \"" +
+            (separator_ == '\t' ? std::string("tab") : std::string(1, separator_)) +
+            "\" between cells, the columns are " + columns.substr(0, 600) +
+            ": name the columns in the first line, or give a .txt of time in ms, distance in mm "
+            "and RSS in dBm");
+  }
+
   void take_json(std::string_view line, std::size_t at) {
     ++out_.report.lines;
     nlohmann::json object;
@@ -173,7 +208,17 @@ class Importer {
     std::optional<Cir> cir;
     for (const auto& [key, value] : object.items()) {
       if (value.is_null()) continue;
-      if (key == "cir" && value.is_object()) {
+      if (key == "truth" && value.is_object()) {  // as this server gives samples out
+        for (const auto& [name, of] : value.items()) {
+          if (of.is_null() || of.is_structured()) continue;
+          const std::string text = of.is_boolean()  ? (of.get<bool>() ? "1" : "0")
+                                   : of.is_string() ? of.get<std::string>()
+                                                    : to_wire(of);
+          row.insert_or_assign(name == "distance_m" ? "true_distance_m" : name, text);
+        }
+      } else if (key == "features" || key == "predicted") {
+        continue;  // computed from what else the line has
+      } else if (key == "cir" && value.is_object()) {
         std::vector<FieldError> errors;
         cir = read_cir(value, "/cir", errors);
         if (!errors.empty())
@@ -190,41 +235,17 @@ class Importer {
     take_row(row, at, std::move(cir));
   }
 
-  // Milliseconds, millimetres, dBm: the first three numbers of the line, whatever stands between them. Where
-  // blanks, tabs or semicolons stand between numbers, a comma inside one is a decimal comma.
   void take_txt(std::string_view line, std::size_t at) {
     ++out_.report.lines;
-    const bool commas_alone = line.find_first_of(" \t;") == std::string_view::npos;
-    const auto commas = std::count(line.begin(), line.end(), ',');
-    if (commas_alone && commas > 2)
-      return refuse(at,
-                    {k_unreadable,
-                     {},
-                     std::to_string(commas + 1) +
-                         " numbers separated by commas alone: with decimal commas, separate the numbers by "
-                         "spaces or semicolons; else give only time in ms, distance in mm and RSS in dBm"});
-    const auto digit = [&](std::size_t i) { return i < line.size() && line[i] >= '0' && line[i] <= '9'; };
-    std::array<double, 3> value{};
-    std::size_t n = 0;
-    for (std::size_t i = 0; i < line.size() && n < 3;) {
-      if (!digit(i) && !(line[i] == '-' && digit(i + 1))) {
-        ++i;
-        continue;
-      }
-      std::size_t end = i + 1;
-      while (digit(end) || (end < line.size() && line[end] == '.' && digit(end + 1)) ||
-             (!commas_alone && end < line.size() && line[end] == ',' && digit(end + 1)))
-        ++end;
-      const auto number = cell_number(line.substr(i, end - i), true);
-      if (!number) return refuse(at, {k_unreadable, {}, "not a number in " + in_quotes(line)});
-      value[n++] = *number;
-      i = end;
-    }
-    if (n < 2) return refuse(at, {k_missing, {}, "needs a time in ms and a distance in mm"});
+    auto read = read_campaign_line(line);
+    if (!read.fault.empty())
+      return refuse(at, {read.too_few ? k_missing : k_unreadable, {}, std::move(read.fault)});
+    if (read.rss_dbm && !row_limits::k_dbm.hold(*read.rss_dbm))
+      return refuse(at, {k_impossible, "rss", "no level: " + in_quotes(line)});
     CampaignMeasurement m;
-    m.t_s = value[0] / 1000;
-    m.range_m = value[1] / 1000;
-    if (n == 3) m.rx_dbm = value[2];
+    m.t_s = read.t_ms / 1000;
+    m.range_m = read.distance_mm / 1000;
+    m.rx_dbm = read.rss_dbm;
     keep(defaults_, std::move(m), at);
   }
 
@@ -238,14 +259,17 @@ class Importer {
       if (!found || says_nothing(found->second)) return std::nullopt;
       const auto parsed = number(found->second);
       if (!parsed)
-        fault.set(k_impossible, found->first, found->first + " is not a number: " + in_quotes(found->second));
+        fault.set(k_impossible, found->first, not_a_number(*found));
       else if (*parsed < low || *parsed > high)
         fault.set(k_impossible, found->first, found->first + " impossible: " + in_quotes(found->second));
       return parsed;
     };
     const auto range = [&](const Names& names, double metres) -> std::optional<double> {
-      const auto found = value(names, 0, k_furthest_m / metres);
-      if (const auto* where = cell(row, names)) range_column = where->first;
+      const auto* where = cell(row, names);
+      // A name without a unit is metres, and no radio measures so many.
+      const bool unit = metres != 1 || !where || where->first.ends_with("_m");
+      const auto found = value(names, 0, unit ? k_furthest_m / metres : row_limits::k_distance_m.max);
+      if (where) range_column = where->first;
       return found ? std::optional{*found * metres} : std::nullopt;
     };
     auto range_m = range(k_measured, 1);
@@ -256,20 +280,25 @@ class Importer {
       for (const auto name : names)
         if (range_column.empty() && row.contains(name)) range_column = name;
     if (!range_m) fault.set(k_missing, range_column, "no measured range (range_m, or range_mm)");
-    constexpr double k_any = 1e300, k_register = 1e9;
+    constexpr double k_any = 1e300;
+    const auto bounded = [&](const Names& names, const row_limits::Bounds& bounds) {
+      return value(names, bounds.min, bounds.max);
+    };
     m.t_s = value({"t_s", "unix_s", "time_s"}, -k_any, k_any);
     if (!m.t_s)
       if (const auto ms = value({"t_ms", "timestamp_ms"}, -k_any, k_any)) m.t_s = *ms / 1000;
-    m.rx_dbm = value(k_rx, -200, 50);
-    m.fp_dbm = value(k_fp, -200, 50);
-    m.fp_amp1 = value(k_f1, 0, k_register);
-    m.fp_amp2 = value(k_f2, 0, k_register);
-    m.fp_amp3 = value(k_f3, 0, k_register);
-    m.cir_power = value(k_cir_power, 0, k_register);
-    m.preamble_count = value(k_count, 0, k_register);
-    m.std_noise = value(k_std_noise, 0, k_register);
-    m.max_noise = value(k_max_noise, 0, k_register);
-    m.fp_index = value(k_fp_index, 0, k_register);
+    if (!m.t_s)
+      if (const auto us = value({"t_us"}, -k_any, k_any)) m.t_s = *us / 1e6;
+    m.rx_dbm = bounded(k_rx, row_limits::k_dbm);
+    m.fp_dbm = bounded(k_fp, row_limits::k_dbm);
+    m.fp_amp1 = bounded(k_f1, row_limits::k_register);
+    m.fp_amp2 = bounded(k_f2, row_limits::k_register);
+    m.fp_amp3 = bounded(k_f3, row_limits::k_register);
+    m.cir_power = bounded(k_cir_power, row_limits::k_register);
+    m.preamble_count = bounded(k_count, row_limits::k_register);
+    m.std_noise = bounded(k_std_noise, row_limits::k_register);
+    m.max_noise = bounded(k_max_noise, row_limits::k_register);
+    m.fp_index = bounded(k_fp_index, row_limits::k_register);
     if (fault.reason) return refuse(at, std::move(fault));
     m.range_m = *range_m;
     m.cir = std::move(cir);
@@ -277,10 +306,22 @@ class Importer {
   }
 
   std::optional<double> number(std::string_view text) const { return cell_number(text, separator_ != ','); }
+  static std::string not_a_number(const Row::value_type& where) {
+    return where.first + " is not a number: " + in_quotes(where.second) +
+           (where.second.find(',') == std::string::npos
+                ? ""
+                : " (with decimal commas, separate the cells by semicolons or tabs; write no thousands)");
+  }
 
   CampaignSite site_of(const Row& row, CampaignSite site, Fault& fault) const {
     const auto text = [&](const Names& names, std::string& out) {
-      if (auto found = find(row, names)) out = std::move(*found);
+      auto found = find(row, names);
+      if (!found) return;
+      // The apostrophe by which an export keeps spreadsheets from running a cell is no part of it.
+      if (found->size() > 1 && found->front() == '\'' &&
+          std::string_view("=+-@").find((*found)[1]) != std::string_view::npos)
+        found->erase(0, 1);
+      out = std::move(*found);
     };
     const auto value = [&](const Names& names, double low, double high, std::optional<double>& out) {
       const auto* found = cell(row, names);
@@ -301,7 +342,7 @@ class Importer {
     value({"heading_deg"}, -360, 720, site.heading_deg);
     value({"height_m", "height_diff_m", "height_difference_m"}, -1000, 1000, site.height_m);
     value({"thickness_m"}, 0, 100, site.thickness_m);
-    value({"truth_sd_m", "truth_accuracy_m"}, 0, 100, site.truth_sd_m);
+    value({"truth_sd_m", "truth_sigma_m", "truth_accuracy_m"}, 0, 100, site.truth_sd_m);
     const auto truth_of = [](const std::string& word) -> std::optional<bool> {
       if (word == "1" || word == "true" || word == "LOS" || word == "los") return true;
       if (word == "0" || word == "false" || word == "NLOS" || word == "nlos") return false;
@@ -334,8 +375,13 @@ class Importer {
       ++report.zero;
       return;
     }
-    if (!(m.range_m > 0) || m.range_m > k_furthest_m)
-      return refuse(at, {k_impossible, column, "range impossible: " + metres(m.range_m)});
+    if (!row_limits::k_campaign_range_m.hold(m.range_m))
+      return refuse(at,
+                    {k_impossible, column,
+                     "range impossible: " + metres(m.range_m) +
+                         (m.range_m > 0 && m.range_m < 1
+                              ? ", shorter than any radio measures (a .txt and range_mm are in millimetres)"
+                              : "")});
     out_.campaign.measurements.push_back(std::move(m));
   }
 
@@ -399,6 +445,13 @@ class Importer {
     measurements = std::move(kept);
     out_.report.kept = measurements.size();
     for (std::size_t s = 0; s < of_site.size(); ++s) summarise(of_site[s], out_.report.sites[s]);
+    std::vector<std::string> environments, sites;
+    for (const auto& one : out_.campaign.sites) {
+      environments.push_back(one.environment);
+      sites.push_back(one.name);
+    }
+    out_.report.warnings = names_alike("environments", environments);
+    for (auto& warning : names_alike("settings", sites)) out_.report.warnings.push_back(std::move(warning));
   }
 
   static void summarise(std::vector<double>& values, CampaignReport::Site& out) {
@@ -417,6 +470,7 @@ class Importer {
   CampaignSite defaults_;
   std::vector<std::string> header_;
   char separator_{','};
+  bool separator_told_{false};
   std::size_t last_{static_cast<std::size_t>(-1)};
   std::optional<Error> fatal_;
   CampaignImport out_;
@@ -425,7 +479,9 @@ class Importer {
 }  // namespace
 
 Result<CampaignImport> import_campaign(std::string_view text, const CampaignOptions& options) {
-  return Importer{options}.run(text);
+  const bool wide = text.starts_with("\xFF\xFE") || text.starts_with("\xFE\xFF");
+  const std::string narrow = wide ? decoded(text) : std::string();
+  return Importer{options}.run(wide ? std::string_view(narrow) : text);
 }
 
 LabelledTable table_of(const Campaign& campaign) {

@@ -56,7 +56,8 @@ struct CampaignReport {
     std::size_t kept{}, zero{}, outliers{};
     double median_m{}, sd_m{};
   };
-  std::vector<Site> sites{};  ///< as Campaign::sites
+  std::vector<Site> sites{};            ///< as Campaign::sites
+  std::vector<std::string> warnings{};  ///< names that differ in capitals or blanks alone
 };
 
 struct CampaignImport {
@@ -65,8 +66,9 @@ struct CampaignImport {
 };
 
 /// Bad lines never sink good ones: they are counted and named.
-/// text    UTF-8; see docs/learning.md for the columns and for the `# key = value` lines of a .txt
-/// errors  bad_frame (no header, no line that can be read), invalid_argument (no range column)
+/// text    UTF-8, or UTF-16 with its mark; see docs/learning.md for the columns and for the `# key = value`
+/// lines of a .txt errors  bad_frame (no header, no line that can be read), invalid_argument (no range
+/// column, two of one name)
 Result<CampaignImport> import_campaign(std::string_view text, const CampaignOptions& options = {});
 
 /// The campaign as a table of labelled rangings: features computed, a place per environment, a placement per

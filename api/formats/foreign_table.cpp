@@ -1,16 +1,15 @@
 #include "api/formats/foreign_table.hpp"
 
-#include <iconv.h>
 #include <zlib.h>
 
 #include <algorithm>
 #include <array>
-#include <cerrno>
 #include <charconv>
 #include <cmath>
 #include <limits>
 
 #include "api/formats/csv_record.hpp"
+#include "api/formats/text_decoding.hpp"
 #include "core/base/text.hpp"
 
 namespace anchord::api {
@@ -18,36 +17,6 @@ namespace {
 
 constexpr std::size_t k_max_rows = 2'000'000, k_sample_rows = 200, k_guess_rows = 10;
 constexpr std::size_t k_max_bytes = std::size_t{1} << 30;
-
-/// From the encoding into UTF-8; what is no character of it becomes U+FFFD.
-std::string converted(std::string_view bytes, const char* encoding) {
-  const iconv_t way = iconv_open("UTF-8", encoding);
-  if (way == iconv_t(-1)) return to_utf8(bytes);
-  std::string in(bytes), out;
-  char* from = in.data();
-  std::size_t left = in.size();
-  std::array<char, 65536> buffer{};
-  while (left > 0) {
-    char* to = buffer.data();
-    std::size_t room = buffer.size();
-    const auto done = iconv(way, &from, &left, &to, &room);
-    out.append(buffer.data(), buffer.size() - room);
-    if (done != std::size_t(-1) || errno == E2BIG) continue;
-    out += "\xEF\xBF\xBD";
-    ++from;
-    --left;
-  }
-  iconv_close(way);
-  return out;
-}
-
-/// By its byte order mark, else UTF-8, else the Western European of Windows, which old programs write.
-std::string decoded(std::string_view bytes) {
-  if (bytes.starts_with("\xFF\xFE")) return converted(bytes.substr(2), "UTF-16LE");
-  if (bytes.starts_with("\xFE\xFF")) return converted(bytes.substr(2), "UTF-16BE");
-  if (bytes.starts_with("\xEF\xBB\xBF")) bytes.remove_prefix(3);
-  return is_utf8(bytes) ? std::string(bytes) : converted(bytes, "WINDOWS-1252");
-}
 
 bool is_blank(char c) { return c == ' ' || c == '\t' || c == '\r' || c == '\n' || c == '\v' || c == '\f'; }
 

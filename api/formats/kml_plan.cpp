@@ -58,9 +58,10 @@ std::optional<double> number(std::string_view text) {
   return value;
 }
 
-class Reader {
+class KmlReader {
  public:
-  Reader(std::vector<std::string>& notes, std::vector<FieldError>& errors) : notes_(notes), errors_(errors) {}
+  KmlReader(std::vector<std::string>& notes, std::vector<FieldError>& errors)
+      : notes_(notes), errors_(errors) {}
 
   Plan plan;
 
@@ -244,7 +245,7 @@ Plan read_kml_plan(std::string_view text, std::vector<std::string>& notes, std::
     errors.push_back({"", "unknown_value", "the document is " + to_utf8(local_name(root), 40) + ", not kml"});
     return {};
   }
-  Reader reader(notes, errors);
+  KmlReader reader(notes, errors);
   reader.walk(root, {});
   if (reader.n_placemarks() == 0 && errors.empty())
     errors.push_back({"", "required", "the file has no Placemark: it contains no drawing"});

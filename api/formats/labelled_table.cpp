@@ -2,12 +2,17 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 #include <unordered_map>
 
 #include "api/formats/cells.hpp"
 #include "api/formats/column_names.hpp"
 #include "api/formats/csv_record.hpp"
 #include "api/formats/gzip_lines.hpp"
+#include "api/formats/names_alike.hpp"
+#include "api/formats/time_unit.hpp"
+#include "api/wire/row_limits.hpp"
+#include "core/ml/plausible.hpp"
 
 namespace anchord::api {
 namespace {
@@ -17,10 +22,10 @@ using namespace columns;
 const Names k_group{"group",    "env",     "environment", "place",   "room",
                     "campaign", "session", "setup",       "tag_pos", "anchor_height_m"};
 const Names k_placement{"setup_id", "placement", "setup", "setting", "measurement_point"};
-const Names k_time{"t_s", "unix_s", "t_us", "time_s"};
+const Names k_time{"t_s", "unix_s", "t_us", "time_s", "t_ms"};
 const Names k_joins{"setup", "idx", "seq"};
 constexpr std::size_t k_none = static_cast<std::size_t>(-1);
-constexpr std::size_t k_time_blocks = 10;
+constexpr std::size_t k_time_blocks = 10, k_times_looked_at = 1000;
 constexpr double k_nan = std::numeric_limits<double>::quiet_NaN();
 
 Error at_line(const std::string& file, const GzipLines& lines, const std::string& what) {
@@ -150,7 +155,17 @@ class TableReader {
     BOOST_OUTCOME_TRY(const bool any, lines.next(line));
     if (!any) return make_error(Errc::bad_frame, file_ + ": empty file, a header line is needed");
     if (line.starts_with("\xEF\xBB\xBF")) line.remove_prefix(3);
-    const char separator = separator_of(line);
+    if (line.starts_with("\xFF\xFE") || line.starts_with("\xFE\xFF") ||
+        line.find('\0') != std::string_view::npos)
+      return make_error(Errc::bad_frame,
+                        file_ + ": UTF-16, as Excel's \"Unicode text\" is: save it as CSV UTF-8");
+    char separator = 0;
+    if (line.starts_with("sep=") && line.size() == 5) {  // of Excel, above the header
+      separator = line[4];
+      BOOST_OUTCOME_TRY(const bool header, lines.next(line));
+      if (!header) return make_error(Errc::bad_frame, file_ + ": a header line is needed below sep=");
+    }
+    if (separator == 0) separator = separator_of(line);
     decimal_comma_ = separator != ',';
     out_.file_names.push_back(file_);
     CsvRecord record({separator});
@@ -192,6 +207,7 @@ class TableReader {
       return make_error(Errc::too_few_observations,
                         file_ + ": no usable row among " + std::to_string(out_.rows_read));
     BOOST_OUTCOME_TRY(map_labels());
+    look_for_oddities();
     if (out_.grouping == Grouping::time_block) {
       for (std::size_t i = 0; i < out_.rows(); ++i)
         out_.group[i] = static_cast<std::uint32_t>(i * k_time_blocks / out_.rows());
@@ -251,7 +267,64 @@ class TableReader {
     BOOST_OUTCOME_TRY(choose_placements());
     out_.raw_names = header_.names;
     find_raw_columns();
+    find_unused();
+    BOOST_OUTCOME_TRYV(refuse_twins());
     return boost::outcome_v2::success();
+  }
+
+  /// Columns that say something to this reader; the others may still be features by their names.
+  std::set<std::size_t> used_columns() const {
+    std::set<std::size_t> out{range_, label_, truth_, header_.first(k_time)};
+    out.insert(group_columns_.begin(), group_columns_.end());
+    out.insert(placement_columns_.begin(), placement_columns_.end());
+    for (const auto& [names, at] : level_columns_) out.insert(at);
+    for (const std::string_view name :
+         {"truth_sigma_m", "truth_sd_m", "truth_accuracy_m", "setup", "idx", "seq"})
+      out.insert(header_.of(name));
+    return out;
+  }
+
+  void find_unused() {
+    const auto used = used_columns();
+    for (std::size_t c = 0; c < header_.names.size(); ++c)
+      if (!used.contains(c) && !header_.names[c].empty()) out_.unused.push_back(header_.names[c]);
+  }
+
+  /// Of two columns of one name nobody knows which is meant: one that is used is refused, others are told.
+  Result<void> refuse_twins() {
+    const auto used = used_columns();
+    for (std::size_t c = 0; c < header_.names.size(); ++c) {
+      const auto first = header_.of(header_.names[c]);
+      if (first == c || header_.names[c].empty()) continue;
+      if (used.contains(first))
+        return make_error(Errc::invalid_argument, file_ + ": columns " + std::to_string(first + 1) + " and " +
+                                                      std::to_string(c + 1) + " are both named " +
+                                                      header_.names[c] + ": rename or remove one");
+      out_.warnings.push_back("columns " + std::to_string(first + 1) + " and " + std::to_string(c + 1) +
+                              " are both named " + header_.names[c] + "; only the first can be a feature");
+    }
+    return boost::outcome_v2::success();
+  }
+
+  void look_for_oddities() {
+    if (const auto at = header_.first(k_time); at != k_none) {
+      const auto odd = time_unit_warning(header_.names[at], times_);
+      if (!odd.empty()) out_.warnings.push_back(odd);
+    }
+    const auto places = groups_.names(), placements = out_.placement_names;
+    for (auto& warning : names_alike("places", places)) out_.warnings.push_back(std::move(warning));
+    for (auto& warning : names_alike("placements", placements)) out_.warnings.push_back(std::move(warning));
+    std::size_t n = 0, implausible = 0;
+    for (std::size_t i = 0; i < out_.rows(); ++i) {
+      if (!out_.true_range_m[i] || !(out_.range_m[i] > 0)) continue;
+      ++n;
+      if (!ml::plausible_range(out_.range_m[i], out_.range_m[i] - *out_.true_range_m[i])) ++implausible;
+    }
+    if (20 * implausible > n)
+      out_.warnings.push_back(
+          std::to_string(implausible) + " of " + std::to_string(n) +
+          " measured ranges are more than twice or less than half of the true one, or farther "
+          "than a radio reaches: are both in metres? No server promotes a model of them");
   }
 
   // A later file may have its columns in another order, lack some that are no one's role, and have others.
@@ -349,6 +422,23 @@ class TableReader {
     if (entry.first++ == 0) entry.second = file_ + ":" + std::to_string(line);
   }
 
+  /// -999 and its like, by which loggers say that there is no level, are none.
+  bool drop_impossible(std::size_t line) {
+    for (const auto& [names, at] : level_columns_) {
+      if (at == k_none || std::isnan(values_[at])) continue;
+      const bool level = names == &k_rx || names == &k_fp;
+      if (names == &k_height || names == &k_heading) continue;
+      const auto& bounds = level ? row_limits::k_dbm : row_limits::k_register;
+      if (bounds.hold(values_[at])) continue;
+      drop(header_.names[at] +
+               (level ? " is no level: only -200 to 50 dBm are, leave the cell empty where there is none"
+                      : " is no register"),
+           line);
+      return true;
+    }
+    return false;
+  }
+
   static const char* lacks(std::string_view cell) {
     return says_nothing(cell) ? " missing" : " is no number";
   }
@@ -357,6 +447,9 @@ class TableReader {
                 const std::vector<float>* taps) {
     values_.clear();
     for (const auto cell : cells) values_.push_back(number_or_nan(cell, decimal_comma_));
+    if (const auto at = header_.first(k_time); at != k_none && times_.size() < k_times_looked_at)
+      times_.push_back(values_[at]);
+    if (drop_impossible(line)) return;
     const auto value = [&](const Names& names) {
       const auto at = level_columns_.at(&names);
       return at == k_none ? std::nullopt : finite(values_[at]);
@@ -374,6 +467,8 @@ class TableReader {
       if (!truth) return drop(header_.names[truth_] + " is no number", line);
       if (!(*truth > 0) || *truth > 1e4) return drop(header_.names[truth_] + " impossible", line);
     }
+    if (range_ != k_none && truth && std::abs(range - *truth) > ml::k_most_bias_m)
+      return drop(header_.names[range_] + " is more than 100 m off its true range", line);
     if (label_ != k_none && cells[label_].empty()) return drop(header_.names[label_] + " missing", line);
     if (label_ != k_none && named_after_class() && !class_word(cells[label_]))
       return drop(header_.names[label_] + " is neither 0 nor 1, LOS nor NLOS", line);
@@ -455,7 +550,7 @@ class TableReader {
   std::size_t range_{k_none}, label_{k_none}, truth_{k_none};
   std::vector<std::size_t> group_columns_, placement_columns_, raw_columns_;
   std::map<const Names*, std::size_t> level_columns_;  ///< what features are computed from
-  std::vector<double> values_;
+  std::vector<double> values_, times_;
   std::vector<std::string> labels_;
   Ids groups_, placements_;
   LabelledTable out_;

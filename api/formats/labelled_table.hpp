@@ -46,6 +46,9 @@ struct LabelledTable {
   Grouping grouping{Grouping::row};
   std::size_t rows_read{};
   Dropped dropped{};
+  std::vector<std::string>
+      unused{};  ///< columns of the first file that are no one's role: features by name alone
+  std::vector<std::string> warnings{};        ///< what is odd about columns, times and names
   std::vector<std::uint32_t> file{}, line{};  ///< where each row stands; empty where the rows are of no file
   std::vector<std::string> file_names{};
   std::vector<std::string> placement_names{};  ///< within their place: two places may use a name twice

@@ -9,8 +9,10 @@
 #include <set>
 
 #include "api/formats/csv_record.hpp"
+#include "api/wire/row_limits.hpp"
 #include "core/base/sha256.hpp"
 #include "core/base/text.hpp"
+#include "core/ml/plausible.hpp"
 
 namespace anchord::api {
 namespace {
@@ -102,6 +104,14 @@ const std::vector<std::string_view>& register_columns() {
 }
 
 bool is_dataset_csv(std::string_view text) { return text.starts_with("feature_set,campaign,environment,"); }
+
+std::string_view impossible_level(const DatasetRow& row) {
+  for (const auto feature : {Feature::rx_dbm, Feature::fp_dbm}) {
+    const auto level = row.features.get(feature);
+    if (level && !row_limits::k_dbm.hold(*level)) return nlos::feature_name(feature);
+  }
+  return {};
+}
 
 std::string place_name(const DatasetRow& row, Place place) {
   switch (place) {
@@ -228,6 +238,9 @@ Result<DatasetTable> DatasetTable::parse(std::string_view text) {
       else
         row.registers[columns[c].slot] = *value;
     }
+    if (const auto name = impossible_level(row); !name.empty())
+      return bad(line,
+                 std::string(name) + " must be -200 to 50 dBm; leave the cell empty where there is no level");
     if (row.features.get(Feature::range_m) && !(row.range_m() > 0))
       return bad(line, "range_m must be above 0");
     out.rows.push_back(std::move(row));
@@ -329,6 +342,10 @@ Result<LearningRows> learning_rows(const DatasetTable& table, const LearningWish
     }
     if (wish.need_truth && !row.features.get(Feature::range_m)) {
       drop("no measured range");
+      continue;
+    }
+    if (wish.need_truth && std::abs(row.range_m() - *row.true_range_m) > ml::k_most_bias_m) {
+      drop("a range more than 100 m off its true distance");
       continue;
     }
     const auto lacking =

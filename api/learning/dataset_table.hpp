@@ -28,6 +28,10 @@ struct DatasetRow {
   double range_m() const { return features.get(nlos::Feature::range_m).value_or(0); }
 };
 
+/// The level of a row that is none (row_limits::k_dbm), by the name of its feature; empty: all are, or are
+/// absent.
+std::string_view impossible_level(const DatasetRow& row);
+
 /// What splits never divide.
 enum class Place : std::uint8_t { environment, campaign, setting };
 inline constexpr auto k_place_words = enum_table<Place>(

@@ -7,6 +7,7 @@
 #include <numeric>
 #include <set>
 
+#include "api/formats/names_alike.hpp"
 #include "core/base/to_wire.hpp"
 #include "core/ml/dataset.hpp"
 #include "core/ml/random.hpp"
@@ -16,6 +17,12 @@ namespace {
 
 using Ordered = nlohmann::ordered_json;
 using nlos::k_feature_count;
+
+/// What loggers write where there is no level, stored before it was refused.
+void drop_impossible_levels(std::vector<DatasetRow>& rows, std::map<std::string, std::size_t>& dropped) {
+  const auto n = std::erase_if(rows, [](const DatasetRow& row) { return !impossible_level(row).empty(); });
+  if (n > 0) dropped["a level outside -200 to 50 dBm"] += n;
+}
 
 /// Measurements whose range is far off the others of their setting.
 std::vector<DatasetRow> without_outliers(std::vector<DatasetRow> rows,
@@ -187,6 +194,14 @@ std::string split_report_json(const DatasetTable& table, Place split_by,
   if (test.rows == 0) warnings.push_back("no part is held out: the figures come from cross-validation only");
   if (!campaigns.empty())
     warnings.push_back("train and test have a campaign in common: the same radios, perhaps the same day");
+  std::vector<std::string> environments_named, settings_named;
+  for (const auto* part : {&train, &test}) {
+    environments_named.insert(environments_named.end(), part->environments.begin(), part->environments.end());
+    settings_named.insert(settings_named.end(), part->settings.begin(), part->settings.end());
+  }
+  for (auto& warning : names_alike("environments", environments_named))
+    warnings.push_back(std::move(warning));
+  for (auto& warning : names_alike("settings", settings_named)) warnings.push_back(std::move(warning));
   Ordered faults = Ordered::array();
   for (const auto& [reason, n] : dropped) faults.push_back({{"reason", reason}, {"count", n}});
   const bool leak = !environments.empty() || !settings.empty() || duplicates > 0;
@@ -237,6 +252,7 @@ std::string split_report_text(const FrozenDataset& set) {
 Result<FrozenDataset> freeze_rows(DatasetTable table, const FreezeOptions& how,
                                   std::map<std::string, std::size_t> dropped) {
   auto& rows = table.rows;
+  drop_impossible_levels(rows, dropped);
   if (how.filter_faults) rows = without_outliers(std::move(rows), dropped);
   if (how.aggregation != Aggregation::none) rows = aggregated(rows, how.aggregation);
   if (rows.empty()) return make_error(Errc::too_few_observations, "no labelled measurement matches");

@@ -28,7 +28,9 @@ Ordered json_of(const RowReport& r) {
                     {"truth", text(r.truth)},
                     {"group_by", text(r.group_by)},
                     {"placement", text(r.placement)}};
+  out["columns"]["unused"] = r.unused;
   if (!r.warning.empty()) out["warning"] = r.warning;
+  if (!r.warnings.empty()) out["warnings"] = r.warnings;
   return out;
 }
 
@@ -52,7 +54,17 @@ std::string text_of(const RowReport& r) {
     out += format("\n  dropped %zu: %s%s%s", entry.first, reason.c_str(),
                   entry.second.empty() ? "" : ", first ", entry.second.c_str());
   if (!r.group_by.empty()) out += "\nplaces by: " + r.group_by;
+  std::string unused;
+  for (const auto& name : r.unused) {
+    if (unused.size() > 400) {
+      unused += ", ...";
+      break;
+    }
+    unused += (unused.empty() ? "" : ", ") + name;
+  }
+  if (!unused.empty()) out += "\ncolumns not used: " + unused;
   if (!r.warning.empty()) out += "\nwarning: " + r.warning;
+  for (const auto& warning : r.warnings) out += "\nwarning: " + warning;
   return out + "\n";
 }
 

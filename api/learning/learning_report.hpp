@@ -18,7 +18,9 @@ struct RowReport {
   std::map<std::string, std::pair<std::size_t, std::string>>
       dropped{};  ///< reason -> how many, first place ("" where unknown)
   std::string label{}, truth{}, group_by{}, placement{};
-  std::string warning{};  ///< an optimistic split, for one
+  std::string warning{};                ///< an optimistic split, for one
+  std::vector<std::string> unused{};    ///< columns that nothing was taken from
+  std::vector<std::string> warnings{};  ///< what is odd about the table
 };
 
 std::string train_json(const ml::TrainingOutcome& outcome, const RowReport& rows,

@@ -25,7 +25,9 @@ inline constexpr WholeBounds k_antenna{0, 255}, k_satellites{0, 255};
 inline constexpr std::size_t k_network_id_bytes = 20, k_campaign_bytes = 200, k_uuid_bytes = 36;
 
 inline constexpr Bounds k_distance_m{0.05, 150};  // reliability of DW1000 radios; 0 is their failure value
-inline constexpr Bounds k_dbm{-200, 50};
+inline constexpr Bounds k_dbm{-200, 50};          // -999 and its like say that there is no level
+inline constexpr Bounds k_register{0, 1e9};       // of a campaign's samples
+inline constexpr Bounds k_campaign_range_m{0.05, 10'000}, k_campaign_truth_m{1e-3, 10'000};
 inline constexpr Bounds k_std_noise{0, 65535};
 inline constexpr Bounds k_heading_deg{-360, 360};
 inline constexpr Bounds k_truth_distance_m{0, 1000};

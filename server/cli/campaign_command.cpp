@@ -44,6 +44,7 @@ void print_report(const api::CampaignReport& r, std::FILE* to) {
     if (drop.count > drop.first.size())
       std::fprintf(to, "    and %zu more\n", drop.count - drop.first.size());
   }
+  for (const auto& warning : r.warnings) std::fprintf(to, "  warning: %s\n", printable(warning).c_str());
   for (const auto& s : r.sites)
     std::fprintf(to, "  %-24s %6zu kept, %zu zero, %zu outliers, median %.3f m, sd %.3f m\n", s.name.c_str(),
                  s.kept, s.zero, s.outliers, s.median_m, s.sd_m);
@@ -54,6 +55,10 @@ int import(const CampaignArguments& a) {
   if (!text) return refuse("campaign", text.error().message);
   const auto read = api::import_campaign(text.value(), options_of(a));
   if (!read) return refuse("campaign", a.file + ": " + read.error().message);
+  if (read.value().report.kept == 0) {
+    print_report(read.value().report, stderr);
+    return refuse("campaign", a.file + ": no row can be used; nothing is written");
+  }
   if (a.out.empty()) {
     std::fputs(api::campaign_csv(read.value().campaign).c_str(), stdout);
     print_report(read.value().report, stderr);

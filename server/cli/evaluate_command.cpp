@@ -36,6 +36,7 @@ Result<Gathered> gather(const EvaluateArguments& a, const ml::ModelInfo& info) {
       table, {info.features, info.task == ml::Task::nlos_id, info.task != ml::Task::nlos_id}, rows, dropped);
   if (!data) return make_error(data.error().code, a.data.files.front() + ": " + data.error().message);
   add_dropped(out.report, dropped);
+  take_features(out.report, info.features);
   out.data = std::move(data).value();
   return out;
 }

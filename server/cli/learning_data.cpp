@@ -1,6 +1,7 @@
 #include "server/cli/learning_data.hpp"
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
@@ -40,9 +41,9 @@ Result<api::LabelledTable> read_data(const DataOptions& o) {
 }
 
 api::RowReport row_report(const DataOptions& o, const api::LabelledTable& table) {
-  api::RowReport report{o.files,        table.rows_read,    table.rows(),
-                        table.dropped,  table.label_column, table.truth_column,
-                        table.group_by, table.placement_by, {}};
+  api::RowReport report{
+      o.files,        table.rows_read,    table.rows(), table.dropped, table.label_column, table.truth_column,
+      table.group_by, table.placement_by, {},           table.unused,  table.warnings};
   if (table.grouping == api::Grouping::row)
     report.warning =
         table.placement_by.empty()
@@ -52,6 +53,12 @@ api::RowReport row_report(const DataOptions& o, const api::LabelledTable& table)
   if (table.grouping == api::Grouping::time_block)
     report.warning = "no column names a place: split into blocks of time";
   return report;
+}
+
+void take_features(api::RowReport& report, const std::vector<std::string>& features) {
+  std::erase_if(report.unused, [&](const std::string& name) {
+    return std::find(features.begin(), features.end(), name) != features.end();
+  });
 }
 
 void add_dropped(api::RowReport& report, const api::Dropped& dropped) {

@@ -23,6 +23,8 @@ struct DataOptions {
 void add_data_options(CLI::App& command, DataOptions& options);
 Result<api::LabelledTable> read_data(const DataOptions& options);
 api::RowReport row_report(const DataOptions& options, const api::LabelledTable& table);
+/// Columns that are features are used.
+void take_features(api::RowReport& report, const std::vector<std::string>& features);
 /// Adds the reasons a data set gave for leaving rows out.
 void add_dropped(api::RowReport& report, const api::Dropped& dropped);
 

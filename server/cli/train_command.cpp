@@ -89,6 +89,7 @@ Result<GatheredTraining> gather_table(const TrainArguments& a, ml::Task task) {
   auto data = api::dataset_from(table, request, rows, dropped);
   if (!data) return make_error(data.error().code, a.data.files.front() + ": " + data.error().message);
   add_dropped(out.report, dropped);
+  take_features(out.report, request.features);
   out.data = std::move(data).value();
   drop_outliers(out.data, rows, table, out.report);
   return out;
@@ -157,7 +158,9 @@ int train(const TrainArguments& a) {
   info.code_version = ANCHORD_VERSION;
   info.not_for_live = not_for_live;
   if (!digest.empty()) info.data_digest = digest;
-  if (const auto written = write_whole(a.out, api::write_model_artifact(learned.value().model)); !written)
+  const auto artifact = api::checked_model_artifact(learned.value().model);
+  if (!artifact) return refuse("train", a.data.files.front() + ": " + artifact.error().message);
+  if (const auto written = write_whole(a.out, artifact.value()); !written)
     return failed("anchord train", written.error().message);
   const auto text = a.json ? api::train_json(learned.value(), report, a.out)
                            : api::train_text(learned.value(), report, a.out);

@@ -1,5 +1,6 @@
 #include "api/formats/campaign.hpp"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -49,6 +50,65 @@ TEST(Campaign, ReadsDecimalCommasOrSaysWhatToDo) {
   EXPECT_NE(torn.value().report.errors[0].detail.find("semicolons"), std::string::npos);
   const auto truth = import_campaign("# distance_m = long\n1000 4512 -79\n");
   EXPECT_EQ(truth.value().report.errors[0].line, 1U);
+}
+
+TEST(Campaign, ReadsTheSeparatorLineOfExcelAndUtf16WithItsMark) {
+  const std::string table = "site;range_m;true_range_m;los\r\na;4,52;4,5;1\r\n";
+  const auto plain = import_campaign("sep=;\r\n" + table);
+  ASSERT_TRUE(plain) << plain.error().message;
+  ASSERT_EQ(plain.value().campaign.measurements.size(), 1U);
+  EXPECT_EQ(plain.value().campaign.measurements[0].range_m, 4.52);
+  EXPECT_EQ(plain.value().campaign.measurements[0].line, 3U);
+  for (const bool little : {true, false}) {
+    std::string wide = little ? "\xFF\xFE" : "\xFE\xFF";
+    for (const char c : table) wide += little ? std::string{c, '\0'} : std::string{'\0', c};
+    const auto read = import_campaign(wide);
+    ASSERT_TRUE(read) << read.error().message;
+    ASSERT_EQ(read.value().campaign.measurements.size(), 1U);
+    EXPECT_EQ(read.value().campaign.measurements[0].range_m, 4.52);
+    EXPECT_FALSE(import_campaign(wide.substr(2))) << "without its mark nobody knows";
+  }
+  const auto tabs = import_campaign("range_m\ttrue_range_m\trx_dbm\n4.5\t4.4\t\n");
+  ASSERT_TRUE(tabs) << tabs.error().message;
+  EXPECT_EQ(tabs.value().report.kept, 1U) << "an empty cell at the end of a line";
+}
+
+// Each of them became measurements of millimetres, or of numbers that are something else.
+TEST(Campaign, RefusesWhatItDoesNotUnderstandWithLineReasonAndWhatToDo) {
+  const auto refused = [](const std::string& text) {
+    const auto read = import_campaign(text);
+    if (!read) return read.error().message;
+    EXPECT_EQ(read.value().report.kept, 0U) << text;
+    if (read.value().report.errors.empty()) return std::string();
+    const auto& first = read.value().report.errors[0];
+    return "line " + std::to_string(first.line) + ": " + first.detail;
+  };
+  using ::testing::AllOf;
+  using ::testing::HasSubstr;
+  EXPECT_THAT(refused("id;dist;level\n1;4.51;-79\n"),
+              AllOf(HasSubstr("line 1: no column of measured ranges"), HasSubstr("\"id\", \"dist\"")));
+  EXPECT_THAT(refused("1|4.51|-79\n"), HasSubstr("line 1: not a number"));
+  EXPECT_THAT(refused("1 4.51 -79\n"), AllOf(HasSubstr("line 1: range impossible: 0.005 m"),
+                                             HasSubstr("shorter than any radio measures")));
+  EXPECT_THAT(import_campaign("1000 4510 -79\n1000 4.51 m -79\n").value().report.errors.at(0).detail,
+              AllOf(HasSubstr("\"m\" is not understood"), HasSubstr("give anything else as CSV")));
+  EXPECT_THAT(import_campaign("1000 4510 mm\n4510 mm 1000 ms\n").value().report.errors.at(0).detail,
+              HasSubstr("is not the unit of the number before it"));
+  EXPECT_THAT(import_campaign("1000 4510 -79\nrange 4510 time 1000\n").value().report.errors.at(0).detail,
+              HasSubstr("announces is not the first"));
+  EXPECT_THAT(refused("1000 4510 -79 12\n"), HasSubstr("line 1: more than three numbers"));
+  EXPECT_THAT(refused("1000 4510 -999\n"), HasSubstr("no level"));
+  EXPECT_THAT(refused("range,true_range_m\n4510,4.5\n"), HasSubstr("impossible")) << "no unit: metres";
+  EXPECT_THAT(refused("range_m,true_range_m\n\"4,51\",4.5\n"), HasSubstr("semicolons"));
+  EXPECT_THAT(refused("range_m,range_m,true_range_m\n4.5,4.6,4.4\n"), HasSubstr("two columns are named"));
+}
+
+TEST(Campaign, WarnsOfPlacesThatDifferInCapitalsAlone) {
+  const auto read =
+      import_campaign("environment,range_m,true_range_m\nHall A,4.5,4.4\nhall a,4.5,4.4\nhall b,4.5,4.4\n");
+  ASSERT_TRUE(read);
+  ASSERT_EQ(read.value().report.warnings.size(), 1U);
+  EXPECT_THAT(read.value().report.warnings[0], ::testing::HasSubstr(R"("Hall A", "hall a")"));
 }
 
 TEST(Campaign, TakesAnImpulseResponseOfAnNdjsonLine) {

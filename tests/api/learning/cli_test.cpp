@@ -178,4 +178,27 @@ TEST_F(LearningCli, UnusableInputExitsWithTwoNamesItAndLeavesNoModel) {
   EXPECT_NE(model.err.find("/manifest"), std::string::npos) << model.err;
 }
 
+TEST_F(LearningCli, SaysWhatOfATableItDoesNotUse) {
+  const auto plain = run("train --data rooms.csv --task nlos_id --method logistic --out m.json");
+  ASSERT_EQ(plain.code, 0) << plain.err;
+  EXPECT_NE(plain.out.find("columns not used: note"), std::string::npos) << plain.out;
+  const auto json = nlohmann::json::parse(
+      run("train --data rooms.csv --task nlos_id --method logistic --out m.json --json").out);
+  EXPECT_EQ(json.at("data").at("columns").at("unused"), nlohmann::json{"note"}) << json;
+}
+
+TEST_F(LearningCli, AModelThatItsReaderWouldRefuseIsNotWritten) {
+  std::string name(200, 'x'), csv = slurp(dir_ / "rooms.csv");
+  csv.replace(csv.find("note"), 4, name);
+  for (std::size_t at; (at = csv.find(",x\n")) != std::string::npos;) csv.replace(at, 3, ",7\n");
+  std::ofstream{dir_ / "long.csv"} << csv;
+  std::ofstream{dir_ / "m.json"} << "what was there";
+  const auto refused =
+      run("train --data long.csv --task nlos_id --method logistic --features rx_dbm,fp_dbm," + name +
+          " --out m.json");
+  EXPECT_EQ(refused.code, 2) << refused.out;
+  EXPECT_NE(refused.err.find("could not be read again and is not kept"), std::string::npos) << refused.err;
+  EXPECT_EQ(slurp(dir_ / "m.json"), "what was there");
+}
+
 }  // namespace anchord::cli_test

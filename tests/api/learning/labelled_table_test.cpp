@@ -249,4 +249,66 @@ TEST_F(LabelledTableTest, JoinsCirsAndDropsRowsWithoutOne) {
   EXPECT_EQ(t.value().dropped.at("no CIR in the CIR table").first, 1U);
 }
 
+TEST_F(LabelledTableTest, LevelsThatSayThereIsNoneAreLeftOutAndCounted) {
+  const auto read_rooms =
+      read({plain("r.csv", k_rooms + "til,0,c,3.0,3.0,-999,-77\ntil,0,c,3.0,3.0,-75,999\n")});
+  ASSERT_TRUE(read_rooms) << read_rooms.error().message;
+  EXPECT_EQ(read_rooms.value().rows(), 3U);
+  std::string reasons;
+  for (const auto& [reason, entry] : read_rooms.value().dropped)
+    reasons += reason + " at " + entry.second + "\n";
+  EXPECT_NE(reasons.find("rx_dbm is no level"), std::string::npos) << reasons;
+  EXPECT_NE(reasons.find("fp_dbm is no level"), std::string::npos) << reasons;
+  EXPECT_NE(reasons.find("r.csv:5"), std::string::npos) << reasons;
+}
+
+TEST_F(LabelledTableTest, TwoColumnsOfOneNameAreRefusedWhereTheyAreUsedAndElseSaid) {
+  const auto used = read({plain("a.csv", "env,range_m,range_m,nlos\nhw,5,6,0\n")});
+  ASSERT_FALSE(used);
+  EXPECT_NE(used.error().message.find("columns 2 and 3 are both named range_m"), std::string::npos)
+      << used.error().message;
+  const auto other = read({plain("b.csv", "env,range_m,note,note,nlos\nhw,5,6,7,0\n")});
+  ASSERT_TRUE(other) << other.error().message;
+  ASSERT_EQ(other.value().warnings.size(), 1U);
+  EXPECT_NE(other.value().warnings[0].find("both named note"), std::string::npos);
+  EXPECT_EQ(other.value().unused, (std::vector<std::string>{"note", "note"}));
+}
+
+TEST_F(LabelledTableTest, TimesOfAnotherUnitThanTheirNameAreSaid) {
+  const auto said = [&](const std::string& name, const std::vector<std::string>& times) {
+    std::string csv = name + ",range_m,nlos\n";
+    for (const auto& t : times) csv += t + ",5,0\n";
+    const auto table = read({plain("t.csv", csv)});
+    EXPECT_TRUE(table);
+    return table.value().warnings.empty() ? std::string() : table.value().warnings[0];
+  };
+  EXPECT_NE(said("t_us", {"1700000000123", "1700000000223"}).find("ms since 1970, not us"),
+            std::string::npos);
+  EXPECT_NE(said("t_us", {"1700000000", "1700000001"}).find("s since 1970, not us"), std::string::npos);
+  EXPECT_NE(said("t_us", {"0.1", "0.2"}).find("no whole microseconds"), std::string::npos);
+  EXPECT_NE(said("t_s", {"1700000000123", "1700000000223"}).find("ms since 1970, not s"), std::string::npos);
+  EXPECT_EQ(said("t_us", {"1700000000123456", "1700000000223456"}), "");
+  EXPECT_EQ(said("t_s", {"1700000000.5", "1700000001.5"}), "");
+  EXPECT_EQ(said("t_us", {"1200000000", "1300000000"}), "") << "twenty minutes after the device began";
+}
+
+TEST_F(LabelledTableTest, ReadsTheSeparatorLineOfExcelAndRefusesUtf16) {
+  const auto excel = read({plain("x.csv", "sep=;\r\nenv;range_m;nlos\r\nhw;5,5;0\r\n")});
+  ASSERT_TRUE(excel) << excel.error().message;
+  EXPECT_EQ(excel.value().range_m, std::vector<double>{5.5});
+  const auto wide = read({plain("w.csv", std::string("\xFF\xFE"
+                                                     "e\0n\0v\0\n\0",
+                                                     10))});
+  ASSERT_FALSE(wide);
+  EXPECT_NE(wide.error().message.find("save it as CSV UTF-8"), std::string::npos) << wide.error().message;
+}
+
+TEST_F(LabelledTableTest, PlacesThatDifferInCapitalsAndRangesThatAreNoMetresAreSaid) {
+  const auto table = read({plain("r.csv", "env,range_m,true_range_m,nlos\nHW,16.7,5,0\nhw,20,6,0\n")});
+  ASSERT_TRUE(table);
+  ASSERT_EQ(table.value().warnings.size(), 2U);
+  EXPECT_NE(table.value().warnings[0].find(R"("HW", "hw")"), std::string::npos);
+  EXPECT_NE(table.value().warnings[1].find("2 of 2 measured ranges"), std::string::npos);
+}
+
 }  // namespace anchord::api::labelled_table_test
