@@ -2,6 +2,7 @@
 #include <nlohmann/json.hpp>
 
 #include "api/formats/csv_text.hpp"
+#include "api/formats/names_alike.hpp"
 #include "api/kit/id_page.hpp"
 #include "api/kit/reader.hpp"
 #include "api/kit/support.hpp"
@@ -139,13 +140,26 @@ Response import(LearningApi& l, const Request& request) {
   auto read = read_campaign_rows(request);
   CampaignStore::Appended done;
   if (!dry_run && !read.rows.empty()) {
-    done = value_or_problem(l.stores.campaigns.append(campaign.id, read.rows, read.digest));
+    done = value_or_problem(l.stores.campaigns.append(campaign.id, read.rows, read.untimed));
     l.audit(request,
             "campaign.import " + to_string(campaign.id) + " " + std::to_string(done.accepted) + " samples");
   }
   Ordered report = Ordered::parse(read.report_json);
   report["accepted"] = dry_run ? read.rows.size() : done.accepted;
   report["duplicates"] = done.duplicates;
+  // A place of this file may differ in capitals from one that is stored.
+  std::vector<std::string> environments, settings;
+  for (const auto& row : read.rows) {
+    environments.push_back(row.truth.environment);
+    settings.push_back(row.truth.setting);
+  }
+  for (const auto& one : value_or_problem(l.stores.campaigns.settings(campaign.id))) {
+    environments.push_back(one.truth.environment);
+    settings.push_back(one.truth.setting);
+  }
+  for (const auto& [what, names] :
+       {std::pair("environments", &environments), std::pair("settings", &settings)})
+    for (auto& warning : names_alike(what, *names)) report["warnings"].push_back(std::move(warning));
   if (dry_run) report["dry_run"] = true;
   return row_report(report, read.rows.empty(), "no row can be used; nothing was stored");
 }
@@ -181,8 +195,8 @@ Result<SamplePage> sample_page(CampaignStore& store, const ModelRegistry::Active
 
 constexpr const char* k_sample_header =
     "id,t_us,seq,environment,setting,true_distance_m,los,heading_deg,height_difference_m,material,thickness_"
-    "m,"
-    "range_m,rx_dbm,fp_dbm,std_noise\r\n";
+    "m,truth_sigma_m,"
+    "range_m,rx_dbm,fp_dbm,fp_amp1,fp_amp2,fp_amp3,cir_power,preamble_count,std_noise,max_noise,fp_index\r\n";
 /// By the names an import knows, so that what is taken out can be brought in again.
 std::string sample_csv(const CampaignStore::StoredSample& s) {
   const auto number = [](const auto& v) { return v ? to_wire(Ordered(*v)) : std::string(); };
@@ -192,8 +206,10 @@ std::string sample_csv(const CampaignStore::StoredSample& s) {
          ',' + csv_text(truth.environment) + ',' + csv_text(truth.setting) + ',' + number(truth.distance_m) +
          ',' + (truth.los ? (*truth.los ? "1" : "0") : "") + ',' + number(truth.heading_deg) + ',' +
          number(truth.height_difference_m) + ',' + csv_text(truth.material) + ',' +
-         number(truth.thickness_m) + ',' + to_wire(Ordered(x.range_m)) + ',' + number(x.rx_dbm) + ',' +
-         number(x.fp_dbm) + ',' + number(x.std_noise) + "\r\n";
+         number(truth.thickness_m) + ',' + number(truth.truth_sigma_m) + ',' + to_wire(Ordered(x.range_m)) +
+         ',' + number(x.rx_dbm) + ',' + number(x.fp_dbm) + ',' + number(x.fp_amp1) + ',' + number(x.fp_amp2) +
+         ',' + number(x.fp_amp3) + ',' + number(x.cir_power) + ',' + number(x.preamble_count) + ',' +
+         number(x.std_noise) + ',' + number(x.max_noise) + ',' + number(x.fp_index) + "\r\n";
 }
 
 Response samples(LearningApi& l, const Request& request) {

@@ -9,13 +9,14 @@
 #include "api/kit/problem.hpp"
 #include "api/kit/reader.hpp"
 #include "api/kit/support.hpp"
-#include "core/base/sha256.hpp"
 #include "core/base/to_wire.hpp"
 
 namespace anchord::api {
 namespace {
 
 using Ordered = nlohmann::ordered_json;
+
+constexpr double k_latest_s = 4e9;  // the year 2096: what is more is of another unit
 
 CampaignFormat format_of(const Request& request) {
   std::string_view type = request.header("content-type");
@@ -58,43 +59,9 @@ Ordered report_json(const CampaignReport& report) {
                         {"outliers", site.outliers},
                         {"median_m", site.median_m},
                         {"sd_m", site.sd_m}});
-  return {{"read", report.lines},
-          {"kept", report.kept},
-          {"dropped", std::move(dropped)},
-          {"errors", lines_json(report.errors)},
-          {"settings", std::move(settings)}};
-}
-
-/// What the rows are, however the file spelt them: a copy of a file is no second campaign. A single row
-/// without a time is not held against the ones before: a still link measures the same number twice.
-std::string digest_of(const std::vector<CampaignRow>& rows) {
-  const bool timed =
-      std::ranges::all_of(rows, [](const CampaignRow& row) { return row.sample.time.has_value(); });
-  if (timed || rows.size() < 2) return {};
-  Sha256 sha;
-  const auto text = [&sha](std::string_view value) {
-    sha.add(static_cast<std::uint64_t>(value.size()));
-    sha.add(value);
-  };
-  const auto number = [&sha](const std::optional<double>& value) {
-    sha.add(std::uint64_t{value.has_value()});
-    sha.add(value.value_or(0));
-  };
-  for (const auto& [truth, x] : rows) {
-    for (const auto* word : {&truth.setting, &truth.environment, &truth.material}) text(*word);
-    number(truth.los ? std::optional<double>(*truth.los ? 1 : 0) : std::nullopt);
-    for (const auto& value : {truth.distance_m, truth.heading_deg, truth.height_difference_m,
-                              truth.thickness_m, truth.truth_sigma_m})
-      number(value);
-    number(x.time ? std::optional(x.time->seconds()) : std::nullopt);
-    for (const auto& value : {std::optional(x.range_m), x.rx_dbm, x.fp_dbm, x.fp_amp1, x.fp_amp2, x.fp_amp3,
-                              x.cir_power, x.preamble_count, x.std_noise, x.max_noise, x.fp_index})
-      number(value);
-    sha.add(static_cast<std::uint64_t>(x.cir ? x.cir->re_im.size() : 0));
-    if (!x.cir) continue;
-    for (const auto tap : x.cir->re_im) sha.add(static_cast<double>(tap));
-  }
-  return sha.hex();
+  return {{"read", report.lines},          {"kept", report.kept},
+          {"dropped", std::move(dropped)}, {"errors", lines_json(report.errors)},
+          {"warnings", report.warnings},   {"settings", std::move(settings)}};
 }
 
 }  // namespace
@@ -111,12 +78,14 @@ CampaignRows read_campaign_rows(const Request& request) {
   d.height_m = query_number(request, "height_difference_m", -1000, 1000);
   d.thickness_m = query_number(request, "thickness_m", 0, 100);
   if (request.query_value("los")) d.los = query_flag(request, "los");
-  const auto read = import_campaign(text_body(request), options);
+  // Excel writes UTF-16 with its mark; whatever else is no UTF-8 is refused with what to do.
+  const bool wide = request.body.starts_with("\xFF\xFE") || request.body.starts_with("\xFE\xFF");
+  const auto read = import_campaign(wide ? request.body : text_body(request), options);
   if (!read)
     throw_problem(422, "validation", read.error().message, {{"", "unreadable", read.error().message}});
   const auto& campaign = read.value().campaign;
   CampaignRows out;
-  out.report_json = to_wire(report_json(read.value().report));
+  std::size_t odd_times = 0, first_odd = 0;
   for (const auto& m : campaign.measurements) {
     const auto& site = campaign.sites[m.site];
     CampaignRow row;
@@ -131,9 +100,10 @@ CampaignRows read_campaign_rows(const Request& request) {
     t.thickness_m = site.thickness_m;
     t.truth_sigma_m = site.truth_sd_m;
     auto& x = row.sample;
-    if (m.t_s && *m.t_s > 0 && *m.t_s < 4e9) {
-      // Several rangings may share one stamp; the line tells them apart, and the same file again is the same.
-      x.time = UtcTime::from_seconds(*m.t_s);
+    if (m.t_s && !(*m.t_s > 0 && *m.t_s < k_latest_s) && odd_times++ == 0) first_odd = m.line;
+    if (m.t_s && *m.t_s > 0 && *m.t_s < k_latest_s) {
+      // Whole microseconds, as exports have them; several rangings may share one stamp.
+      x.time = UtcTime::from_us(std::llround(*m.t_s * 1e6));
       x.seq = m.line;
     }
     x.range_m = m.range_m;
@@ -150,7 +120,15 @@ CampaignRows read_campaign_rows(const Request& request) {
     x.cir = m.cir;
     out.rows.push_back(std::move(row));
   }
-  out.digest = digest_of(out.rows);
+  auto report = report_json(read.value().report);
+  report["warnings"] = Ordered::array();  // those about names: together with what is stored
+  if (odd_times > 0)
+    report["warnings"].push_back("the times of " + std::to_string(odd_times) +
+                                 " rows are no seconds since 1970 and are left out, the first in line " +
+                                 std::to_string(first_odd) +
+                                 ": t_s is in seconds, t_ms in milliseconds, t_us in microseconds");
+  out.report_json = to_wire(report);
+  if (out.rows.size() == 1) out.untimed = CampaignStore::Untimed::fresh;
   return out;
 }
 

@@ -12,7 +12,8 @@ namespace anchord::api {
 /// line. Query parameters name the truth of rows that tell none.
 struct CampaignRows {
   std::vector<CampaignRow> rows;
-  std::string digest;       ///< SHA-256 of the rows; empty where each has a time or there is but one
+  /// A single row without a time is always new: a still link measures the same number twice.
+  CampaignStore::Untimed untimed{CampaignStore::Untimed::known};
   std::string report_json;  ///< what was read, what was dropped and why, line by line for the first 100
 };
 /// Throws ProblemException: 415, 422.

@@ -38,11 +38,13 @@ class CampaignStore {
   struct Appended {
     std::size_t accepted{}, duplicates{};
   };
+  enum class Untimed : std::uint8_t { known, fresh };
   /// All or none. A setting is known by its name; its first row's truth stands (conflict names a row that
-  /// says otherwise). Rows with a time are unique by (setting, time, seq). Rows of an import whose digest the
-  /// campaign has are all duplicates; an empty digest is of no import.
+  /// says otherwise). A row is a duplicate where its setting has a sample that agrees in everything the row
+  /// tells (times to the microsecond), as often as it has one; two samples of one time and other content are
+  /// two. Untimed::fresh: rows without a time are all new.
   virtual Result<Appended> append(const CampaignId& id, const std::vector<CampaignRow>& rows,
-                                  std::string_view import_digest = {}) = 0;
+                                  Untimed untimed = Untimed::known) = 0;
 
   struct Setting {
     GroundTruth truth;

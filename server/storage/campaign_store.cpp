@@ -1,6 +1,7 @@
 #include <cmath>
 #include <map>
 
+#include "server/storage/known_samples.hpp"
 #include "server/storage/measurement_rows.hpp"
 #include "server/storage/stores.hpp"
 
@@ -18,9 +19,6 @@ constexpr const char* k_columns =
     "SELECT id, name, radio, note, truth_sigma_m, created_t_ns, version FROM campaign ";
 constexpr const char* k_key = "SELECT campaign_key FROM campaign WHERE id = ?1";
 constexpr const char* k_remove = "DELETE FROM campaign WHERE id = ?1 RETURNING campaign_key";
-constexpr const char* k_insert_import =
-    "INSERT INTO campaign_import (campaign_key, digest) VALUES (?1, ?2) ON CONFLICT DO NOTHING "
-    "RETURNING campaign_key";
 constexpr const char* k_setting_columns =
     "s.name, s.environment, s.distance_m, s.los, s.heading_deg, s.height_difference_m, s.material, "
     "s.thickness_m, s.truth_sigma_m";
@@ -176,15 +174,10 @@ class SqlCampaignStore final : public CampaignStore {
   }
 
   Result<Appended> append(const CampaignId& id, const std::vector<CampaignRow>& rows,
-                          std::string_view import_digest) override {
+                          Untimed untimed) override {
     return write_value<Appended>(gate_, rows.size() + 1, [&](Connection& c) -> Result<Appended> {
       const auto key = key_of(c, id);
       if (!key) return no_campaign(id);
-      if (!import_digest.empty()) {
-        Query import(c, k_insert_import);
-        import << *key << import_digest;
-        if (!import.returned()) return Appended{0, rows.size()};
-      }
       std::map<std::string, std::pair<std::int64_t, GroundTruth>, std::less<>> known;
       Query settings(c, std::string("SELECT s.setting_key, ") + k_setting_columns +
                             " FROM campaign_setting s WHERE s.campaign_key = ?1");
@@ -194,9 +187,15 @@ class SqlCampaignStore final : public CampaignStore {
         auto truth = read_truth(settings);
         known.try_emplace(truth.setting, setting, truth);
       }
+      std::map<std::string_view, std::vector<const CampaignSample*>> of_setting;
+      for (const auto& row : rows)
+        if (row.sample.time || untimed == Untimed::known)
+          of_setting[row.truth.setting].push_back(&row.sample);
+      std::map<std::int64_t, KnownSamples> samples;
       Appended done;
       for (std::size_t i = 0; i < rows.size(); ++i) {
         const auto& truth = rows[i].truth;
+        const bool is_new = !known.contains(truth.setting);
         auto at = known.find(truth.setting);
         if (at == known.end()) {
           at = known.try_emplace(truth.setting, insert_setting(c, *key, truth), truth).first;
@@ -204,7 +203,22 @@ class SqlCampaignStore final : public CampaignStore {
           return make_error(Errc::conflict, "row " + std::to_string(i + 1) + ": setting " + truth.setting +
                                                 " exists with other true values");
         }
-        ++(insert_sample(c, at->second.first, rows[i].sample) ? done.accepted : done.duplicates);
+        const auto setting = at->second.first;
+        auto here = samples.find(setting);
+        if (here == samples.end())
+          here = samples
+                     .try_emplace(setting, c, setting,
+                                  is_new ? std::vector<const CampaignSample*>{} : of_setting[truth.setting])
+                     .first;
+        CampaignSample sample = rows[i].sample;
+        if ((sample.time || untimed == Untimed::known) && here->second.take(sample)) {
+          ++done.duplicates;
+          continue;
+        }
+        // Again where another server has just taken the number.
+        do sample.seq = here->second.free_seq(sample);
+        while (!insert_sample(c, setting, sample));
+        ++done.accepted;
       }
       return done;
     });

@@ -131,6 +131,37 @@ TEST_P(LearningStoreContract, CountsARepeatedSampleAndRefusesAnotherTruthForASet
   EXPECT_EQ(db_->stores().campaigns.settings(c.id).value()[0].n_samples, 2u);
 }
 
+TEST_P(LearningStoreContract, KnowsASampleByItsContentAndKeepsAnotherOfTheSameTime) {
+  const auto c = stored_campaign();
+  auto& campaigns = db_->stores().campaigns;
+  const auto counts = [&](const std::vector<CampaignRow>& rows,
+                          CampaignStore::Untimed untimed = CampaignStore::Untimed::known) {
+    const auto done = campaigns.append(c.id, rows, untimed).value();
+    return std::pair(done.accepted, done.duplicates);
+  };
+  using Counts = std::pair<std::size_t, std::size_t>;
+  auto first = row("a", 5.2, 1'000'000);
+  first.sample.rx_dbm = -80;
+  first.sample.cir = Cir{{1, -2}, 1001.6, 744.2, 1001.0};
+  first.sample.seq = 2;
+  EXPECT_EQ(counts({first}), Counts(1, 0));
+  // Told again by one that tells less (no level, no response, less than a microsecond off, another number).
+  EXPECT_EQ(counts({row("a", 5.2, 1'000'900)}), Counts(0, 1));
+  auto level = first, response = first;
+  level.sample.rx_dbm = -81;
+  response.sample.cir->re_im[0] = 7;
+  EXPECT_EQ(counts({level, response, first, row("a", 5.3, 1'000'000)}), Counts(3, 1));
+  EXPECT_EQ(counts({level, response, first, row("a", 5.3, 1'000'000)}), Counts(0, 4));
+  // Without a time: as often as it is there, unless it is said to be new.
+  auto still = row("b", 6, 0);
+  still.sample.time.reset();
+  EXPECT_EQ(counts({still, still}), Counts(2, 0));
+  EXPECT_EQ(counts({still, still, still}), Counts(1, 2));
+  EXPECT_EQ(counts({still}, CampaignStore::Untimed::fresh), Counts(1, 0));
+  EXPECT_EQ(counts({row("b", 6, 0)}), Counts(1, 0)) << "one with a time is another";
+  EXPECT_EQ(campaigns.settings(c.id).value()[1].n_samples, 5u);
+}
+
 TEST_P(LearningStoreContract, KeepsNamesOfCampaignsApartAndVersionsInOrder) {
   auto c = stored_campaign();
   CampaignRecord mirror = c;
