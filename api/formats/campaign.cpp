@@ -332,13 +332,14 @@ class Importer {
                          found->first + " impossible: " + in_quotes(found->second));
       out = parsed;
     };
+    constexpr auto truth_m = row_limits::k_campaign_truth_m;
     text(k_site_name, site.name);
     text(k_environment, site.environment);
     text({"material"}, site.material);
-    value(k_campaign_truth, 1e-3, k_furthest_m, site.distance_m);
+    value(k_campaign_truth, truth_m.min, truth_m.max, site.distance_m);
     // In a .txt header and beside a range column, distance_m is the truth.
     if (find(row, k_measured) || find(row, k_measured_mm) || row.size() == 1)
-      value({"distance_m"}, 1e-3, k_furthest_m, site.distance_m);
+      value({"distance_m"}, truth_m.min, truth_m.max, site.distance_m);
     value({"heading_deg"}, -360, 720, site.heading_deg);
     value({"height_m", "height_diff_m", "height_difference_m"}, -1000, 1000, site.height_m);
     value({"thickness_m"}, 0, 100, site.thickness_m);

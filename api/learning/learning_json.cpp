@@ -5,6 +5,7 @@
 #include "api/admin/job_json.hpp"
 #include "api/kit/or_null.hpp"
 #include "api/kit/reader.hpp"
+#include "api/wire/row_limits.hpp"
 #include "api/wire/rows_json.hpp"
 
 namespace anchord::api {
@@ -226,9 +227,9 @@ nlos::FeatureVector read_features(const Json& sample, const std::string& at,
   };
   take("range_m", s.range_m, 0.01, 1e4);
   take("distance_m", s.range_m, 0.01, 1e4);
-  take("rss_dbm", s.rx_dbm, -200, 50);
-  take("rx_dbm", s.rx_dbm, -200, 50);
-  take("fp_dbm", s.fp_dbm, -200, 50);
+  take("rss_dbm", s.rx_dbm, row_limits::k_dbm.min, row_limits::k_dbm.max);
+  take("rx_dbm", s.rx_dbm, row_limits::k_dbm.min, row_limits::k_dbm.max);
+  take("fp_dbm", s.fp_dbm, row_limits::k_dbm.min, row_limits::k_dbm.max);
   take("fp_amp1", s.fp_amp1, 0, 1e6);
   take("fp_amp2", s.fp_amp2, 0, 1e6);
   take("fp_amp3", s.fp_amp3, 0, 1e6);

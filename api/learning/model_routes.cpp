@@ -232,7 +232,10 @@ GateReport gate_report(LearningApi& l, const Standing& now, const ModelSource::A
   }
   const ml::Model* active = current ? &current->model : nullptr;
   std::optional<DatasetTable> places;
-  if (active != nullptr && active->info.data_digest != model.info.data_digest) {
+  // On the same data both were compared above, if the manifest that says so can be believed.
+  const bool same_data =
+      data.believe_manifest && active != nullptr && active->info.data_digest == model.info.data_digest;
+  if (active != nullptr && !same_data) {
     places = value_or_problem(table_of_digest(l.stores.datasets, active->info.data_digest));
     data.active = {true, places ? &*places : nullptr, current->standing == ModelStanding::made};
   }

@@ -1,5 +1,7 @@
 // Campaigns of strangers through the routes: which samples are the same, which models replace which, and what
 // a file that is not understood becomes.
+#include <algorithm>
+
 #include "tests/api/app_fixture.hpp"
 
 namespace anchord::test::sample_identity_test {
@@ -142,6 +144,21 @@ TEST_F(ForeignCampaigns, AModelOfOneOddRoomDoesNotReplaceAGoodOneWithoutAReason)
   EXPECT_EQ(json(get("/api/v1/models/active"))["models"]["los_bias"]["id"].dump(),
             Json(home.value("model", "").substr(15)).dump());
   EXPECT_EQ(promote(odd, R"({"reason":"the hall was rebuilt"})").status, 200);
+}
+
+// Whoever writes a manifest can copy the digest of somebody's data into it.
+TEST_F(ForeignCampaigns, AManifestFromElsewhereDoesNotSayThatItsDataAreThoseOfTheActiveModel) {
+  const auto home = trained_on("home", room("home", 0.1));
+  ASSERT_EQ(promote(home).status, 200);
+  auto foreign = json(get(home.value("model", "") + "/artifact"));
+  foreign.erase("signature");
+  foreign["manifest"]["method"] = "of another server";
+  const auto made = post("/api/v1/models", foreign.dump());
+  ASSERT_EQ(made.status, 201) << made.body;
+  const auto gate = json(get("/api/v1/models/" + json(made).value("id", "") + "/gate"));
+  const auto on_places = std::ranges::count_if(
+      gate["checks"], [](const Json& check) { return check["basis"] == "active_places"; });
+  EXPECT_EQ(on_places, 1) << gate;
 }
 
 TEST_F(ForeignCampaigns, AModelOfNanosecondsIsRefused) {
