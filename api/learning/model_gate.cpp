@@ -221,6 +221,7 @@ GateReport gate_of(const ml::Model& candidate, const ml::Model* current, const G
                     " single ranges to evaluate it on: freeze one with other places, or promote it with a "
                     "reason");
     check_plausible(candidate, data, checks);
+    check_active_places(candidate, current, data, checks);
     return checks.out;
   }
   if (candidate.info.task == ml::Task::nlos_id) {

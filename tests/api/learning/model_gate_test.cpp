@@ -5,6 +5,7 @@
 
 #include <algorithm>
 
+#include "api/learning/model_registry.hpp"
 #include "api/learning/range_features.hpp"
 
 namespace anchord::api::model_gate_test {
@@ -63,6 +64,25 @@ TEST(RangeFeatures, OfARangeAreThoseThatModelsMayAskFor) {
   for (std::size_t f = 0; f < nlos::k_feature_count; ++f)
     EXPECT_EQ(features.present.test(f), nlos::live_ranges_have(static_cast<Feature>(f)))
         << nlos::feature_name(static_cast<Feature>(f));
+}
+
+// What a flight gets of a model that is 20 m wrong: the reason, and nothing to take off.
+TEST(RangeFeatures, ARangeOfAFlightIsToldThatItsCorrectionIsWithheld) {
+  auto good = correction(0.1, "a", 0.01), wrong = correction(20, "b", 0.01);
+  good.info.task = wrong.info.task = ml::Task::bias;
+  Range range;
+  range.distance_m = 2;
+  const auto of = [&](ml::Model model) {
+    std::vector<ml::Model> models;
+    models.push_back(std::move(model));
+    return predict_range(models_together(std::move(models), ml::Correction::weighted).value(), range);
+  };
+  const auto applied = of(good), kept = of(wrong);
+  ASSERT_TRUE(applied && kept);
+  EXPECT_EQ(applied->bias_m, 0.1);
+  EXPECT_EQ(applied->withheld, "");
+  EXPECT_FALSE(kept->bias_m);
+  EXPECT_EQ(kept->withheld, ml::why_withheld(ml::Withheld::implausible));
 }
 
 // The one trained on means claims 1 cm of its means and is 9 cm off on ranges.

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cstdio>
 #include <map>
+#include <memory>
 #include <set>
 
 #include "core/localize/flight_solver.hpp"
@@ -227,6 +228,37 @@ TEST(LiveMission, NoAnchorConvergesBeforeAJointSolution) {
   ASSERT_TRUE(
       mission.adopt(solve_flight(problem.flight, problem.options).value(), problem.cut, problem.generation));
   EXPECT_EQ(mission.state().anchors_converged, 4U);
+}
+
+/// A model that is metres wrong: applied, its anchors are named; withheld, they stand where they stood
+/// without it.
+TEST(LiveMission, AlarmsKnowOfCorrectionsThatMoveAnchorsAndOfThoseNotApplied) {
+  const auto data = make_flight(turning());
+  const auto flown = [&](const std::optional<RangeModel>& model) {
+    auto mission = std::make_unique<LiveMission>(setup_of(data));
+    for (auto row : stream(data)) {
+      if (auto* judged = std::get_if<flight::PredictedRange>(&row)) judged->model = model;
+      mission->add(row);
+    }
+    mission->finish();
+    mission->settle();
+    return mission;
+  };
+  const auto pulse = [](LiveMission& mission) { return mission.watch().look(mission.state().time, {}); };
+  RangeModel applied, withheld;
+  applied.bias_m = -8;
+  withheld.withheld = "it is of another unit";
+  const auto without = flown(std::nullopt), moved = flown(applied), kept = flown(withheld);
+  EXPECT_EQ(pulse(*without).models_moved, "");
+  EXPECT_EQ(pulse(*without).models_withheld, "");
+  EXPECT_NE(pulse(*moved).models_moved, "");
+  EXPECT_EQ(pulse(*moved).models_withheld, "");
+  EXPECT_EQ(pulse(*kept).models_withheld, withheld.withheld);
+  EXPECT_EQ(pulse(*kept).models_moved, "");
+  const auto before = without->estimates(), after = kept->estimates();
+  ASSERT_EQ(before.size(), after.size());
+  for (std::size_t i = 0; i < before.size(); ++i)
+    EXPECT_EQ(before[i].best->position.m, after[i].best->position.m);
 }
 
 /// What was stored is counted and estimated, and tells of nothing that happened then.
