@@ -60,7 +60,7 @@ set(rows
   "api/mqtt: core/base core/ports api/kit api/stream api/anchors"
   "api/omlox: core/base core/types core/ports core/geo api/kit api/stream api/anchors api/webhooks"
   "api/places: core/base core/types core/ports core/geo core/floor_plan api/kit api/admin api/work"
-  "api/bundles: core/base core/types core/ports api/kit api/formats api/admin"
+  "api/bundles: core/base core/types core/ports api/kit api/formats api/admin api/planning"
   "api: core/base core/types core/ports core/geo core/localize api/kit api/scope api/stream api/wire api/admin api/work api/devices api/learning api/missions api/measurements api/anchors api/planning api/flight api/calibration api/exchange api/webhooks api/mqtt api/omlox api/places api/bundles"
 
   "migrations:"

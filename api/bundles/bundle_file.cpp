@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cerrno>
 
+#include "api/bundles/bundle_values.hpp"
 #include "api/bundles/spool.hpp"
 
 namespace anchord::api {
@@ -143,6 +144,8 @@ Result<bool> BundleZipSource::next(BundleRow& row) {
   auto read = read_bundle_line(*table_, line, width_);
   if (!read) return make_error(read.error().code, at + ": " + read.error().message);
   row = std::move(read).value();
+  if (const auto fault = fault_of(*table_, row); !fault.empty())
+    return make_error(Errc::bad_frame, at + ": " + fault);
   return true;
 }
 

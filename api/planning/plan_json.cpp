@@ -258,10 +258,14 @@ StoredPlan stored(const Plan& plan) {
 
 Plan plan_of(const StoredPlan& row) {
   std::vector<FieldError> errors;
-  Plan plan = read_plan(Json::parse(row.document.text), errors);
-  if (!errors.empty()) {
-    throw std::logic_error("stored plan " + to_string(row.id) + ": " + errors[0].pointer + ": " +
-                           errors[0].detail);
+  Json document;
+  Plan plan;
+  const bool is_json = !parse_json(row.document.text, document);
+  if (is_json) plan = read_plan(document, errors);
+  if (!is_json || !errors.empty()) {
+    plan = Plan{};
+    plan.name = row.name + " (its document cannot be read)";
+    plan.site = row.site;
   }
   plan.id = row.id;
   plan.created = row.created;

@@ -18,7 +18,8 @@ nlohmann::ordered_json plan_json(const Plan& plan);
 Plan read_plan(const nlohmann::json& body, std::vector<FieldError>& errors);
 
 StoredPlan stored(const Plan& plan);
-/// Broken documents cannot be stored, so one is a fault and throws.
+/// One whose document this version cannot read (a newer server's, or spoiled by hand) has its identity and a
+/// name that says so, and nothing to fly: it can be listed, replaced and deleted.
 Plan plan_of(const StoredPlan& row);
 
 nlohmann::ordered_json plan_check_json(const planning::PlanCheck& check);

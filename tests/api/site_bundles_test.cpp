@@ -145,5 +145,61 @@ TEST_F(Bundles, OfASiteAreRefusedWholeWhereAnyPartIsNotWhatItSays) {
   refused(other_site, "no row of its site");
 }
 
+// A row that the database took and no reader could read again made lists fail for everybody.
+TEST_F(Bundles, WithRowsThatNobodyCouldReadAgainAreRefusedByLineAndColumn) {
+  const auto refused = [](const std::string& bundle, const std::string& why) {
+    OtherServer other;
+    const auto answer = other.take(bundle);
+    EXPECT_EQ(answer.status, 422) << why << answer.body;
+    EXPECT_NE(answer.body.find(why), std::string::npos) << answer.body;
+    expect_nothing(other);
+    for (const char* list : {"/api/v1/plans", "/api/v1/sites", "/api/v1/calibrations"})
+      EXPECT_EQ(other.get(list).status, 200) << list;
+  };
+  const auto site = *database_->stores().missions.mission(id_).value().site;
+  const auto plan = post("/api/v1/plans", Json{{"name", "South"}, {"site", to_string(site)}}.dump());
+  ASSERT_EQ(plan.status, 201) << plan.body;
+  const auto of_site = [&](const std::string& table, const std::string& from, const std::string& to) {
+    auto entries = entries_of(text(get("/api/v1/sites/" + to_string(site) + "/bundle")));
+    std::string& rows = content(entries, "tables/" + table + ".ndjson");
+    const auto at = rows.find(from, rows.find('\n'));
+    EXPECT_NE(at, std::string::npos) << from << " in " << rows;
+    rows.replace(at, from.size(), to);
+    auto manifest = api::read_site_manifest(content(entries, "manifest.json")).value();
+    for (auto& entry : manifest.entries) {
+      Sha256 sum;
+      sum.add(content(entries, entry.name));
+      entry.bytes = content(entries, entry.name).size();
+      entry.sha256_hex = sum.hex();
+    }
+    content(entries, "manifest.json") = api::write_site_manifest(manifest);
+    return zip_of(entries);
+  };
+  const std::string name = R"(\"name\":)";
+  refused(of_site("plan", name, R"(\"nme\":)"), "tables/plan.ndjson line 2: document_json is no plan");
+  refused(of_site("plan", name, R"(\"name\")"), "document_json is not JSON");
+  refused(of_site("plan", name, R"(\"\u0000\":)"), "has a character 0");
+  const double lat_deg = database_->stores().sites.site(site).value().origin->lat_deg;
+  refused(of_site("site", Json(lat_deg).dump(), "1e308"), "origin_lat_deg is not within -90 and 90");
+}
+
+TEST_F(Bundles, OfAPlanThatIsSpoiledInTheDatabaseLeaveListsAndTheWayOutOpen) {
+  const auto made = post("/api/v1/plans", R"({"name":"South"})");
+  ASSERT_EQ(made.status, 201) << made.body;
+  const std::string id = json(made)["id"];
+  {
+    sqlite3* db = nullptr;
+    ASSERT_EQ(sqlite3_open((dir_ / "data" / "anchord.db").c_str(), &db), SQLITE_OK);
+    EXPECT_EQ(sqlite3_exec(db, "UPDATE plan SET document_json = '{'", nullptr, nullptr, nullptr), SQLITE_OK);
+    sqlite3_close(db);
+  }
+  const auto list = get("/api/v1/plans");
+  ASSERT_EQ(list.status, 200) << list.body;
+  EXPECT_EQ(json(list)["items"][0]["name"], "South (its document cannot be read)");
+  Call options;
+  options.headers["if-match"] = header(get("/api/v1/plans/" + id), "ETag");
+  EXPECT_EQ(call(Method::del, "/api/v1/plans/" + id, "", options).status, 204);
+}
+
 }  // namespace
 }  // namespace anchord::test::site_bundles_test
