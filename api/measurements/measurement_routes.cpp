@@ -108,19 +108,27 @@ void append_fix_csv(std::string& out, const Fix& f, std::int64_t id) {
   line.number(f.correction_age_s).whole(f.satellites).end();
 }
 
-/// Streams every page that matches (or `limit` rows where asked for); memory is one page.
+constexpr std::size_t k_stream_page = 1000;
+
+/// Streams every page that matches (or `limit` rows where asked for); memory is one page. The first is read
+/// before the status is sent, so that a flight that is not there is 404 as in JSON.
 template <class Fetch, class Write>
 Response stream(const Request& request, MeasurementStore::Filter filter, std::string type, std::string header,
                 Fetch fetch, Write write) {
+  using Page = std::decay_t<decltype(fetch(filter).value())>;
   struct Progress {
     MeasurementStore::Filter filter;
     std::string header;
     std::size_t left;
+    std::optional<Page> first{};
     bool done{false};
   };
   const bool limited = request.query_value("limit").has_value();
-  auto state = std::make_shared<Progress>(
-      Progress{std::move(filter), std::move(header), limited ? filter.limit : SIZE_MAX});
+  const std::size_t most = limited ? filter.limit : SIZE_MAX;
+  filter.limit = std::min(k_stream_page, most);
+  auto first = value_or_problem(fetch(filter));
+  auto state =
+      std::make_shared<Progress>(Progress{std::move(filter), std::move(header), most, std::move(first)});
   Response response;
   response.header("Content-Type", std::move(type));
   response.body_stream = [state, fetch, write]() -> std::string {
@@ -128,15 +136,18 @@ Response stream(const Request& request, MeasurementStore::Filter filter, std::st
     if (!out.empty() || state->done) return out;
     // A page of a class may be empty and yet not the last: an empty answer here would be the end.
     while (out.empty() && !state->done) {
-      state->filter.limit = std::min<std::size_t>(1000, state->left);
-      const auto page = fetch(state->filter);
-      // The status is sent already; an early end is all that can still be told.
-      if (!page) throw BodyError(503, page.error().message);
-      for (std::size_t i = 0; i < page.value().rows.size(); ++i)
-        write(out, page.value().rows[i], page.value().ids[i]);
-      state->left -= page.value().rows.size();
-      state->filter.after = page.value().next;
-      state->done = page.value().next.empty() || state->left == 0;
+      auto page = std::exchange(state->first, std::nullopt);
+      if (!page) {
+        state->filter.limit = std::min(k_stream_page, state->left);
+        auto fetched = fetch(state->filter);
+        // The status is sent already; an early end is all that can still be told.
+        if (!fetched) throw BodyError(503, fetched.error().message);
+        page = std::move(fetched).value();
+      }
+      for (std::size_t i = 0; i < page->rows.size(); ++i) write(out, page->rows[i], page->ids[i]);
+      state->left -= page->rows.size();
+      state->filter.after = page->next;
+      state->done = page->next.empty() || state->left == 0;
     }
     return out;
   };

@@ -303,6 +303,15 @@ TEST_F(Ingest, ExportsWhatItTookAsCsvAndNdjson) {
   const auto lines = text(get("/api/v1/ranges", {{"format", "ndjson"}, {"mission", id_}}));
   EXPECT_EQ(std::count(lines.begin(), lines.end(), '\n'), 2500);
 }
+TEST_F(Ingest, AFlightThatIsNotThereIsNotFoundInEveryFormat) {
+  for (const char* list : {"/api/v1/ranges", "/api/v1/fixes"})
+    for (const char* format : {"json", "ndjson", "csv"}) {
+      Call options;
+      options.query = {{"mission", "0197b0ff-0000-7000-8000-000000000000"}, {"format", format}};
+      EXPECT_EQ(call(Method::get, list, "", options).status, 404) << list << ' ' << format;
+    }
+}
+
 TEST_F(Ingest, SaysAgainWhereTheCreatedThingIs) {
   Call options;
   options.headers["idempotency-key"] = "create-once";
