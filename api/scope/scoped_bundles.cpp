@@ -42,7 +42,7 @@ std::optional<std::size_t> column(const BundleTable& table, std::string_view nam
 }
 
 struct Seen {
-  MissionStore& missions;  ///< scoped
+  MissionStore &missions, &all_missions;  ///< the first is scoped
   CalibrationStore &calibrations, &all_calibrations;
   PlaceStore &places, &all_places;
 };
@@ -129,10 +129,9 @@ class Source final : public BundleSource, private Rows {
  private:
   Result<bool> takes(const BundleRow& row) {
     const std::string& name = table_->name;
-    if (name == "mission" && !current_sites().holds(id_of<SiteId>(row.at(1))))
-      return make_error(Errc::conflict,
-                        "the flight is of another site than those that this token is bound to: nothing of "
-                        "it was imported");
+    if (name == "mission") {
+      BOOST_OUTCOME_TRYV(check_flight(row));
+    }
     if (name == "calibration" || among(k_of_calibrations, name)) return calibrations_.contains(row.at(0));
     if (name == "exclusion") kept_.insert(row.at(0));
     if (name == "exclusion_row" || name == "exclusion_taken_back") return kept_.contains(row.at(0));
@@ -142,6 +141,17 @@ class Source final : public BundleSource, private Rows {
     return keeps(*table_, row);
   }
 
+  /// By the bundle, and where it is here, by the site that it has here: what is missing is added to it.
+  Result<void> check_flight(const BundleRow& row) {
+    const auto id = id_of<MissionId>(row.at(0));
+    BOOST_OUTCOME_TRY(const bool here, is_there(seen_.all_missions.mission(id)));
+    BOOST_OUTCOME_TRY(const bool theirs, is_there(seen_.missions.mission(id)));
+    if (current_sites().holds(id_of<SiteId>(row.at(1))) && (theirs || !here))
+      return boost::outcome_v2::success();
+    return make_error(Errc::conflict,
+                      "the flight is of another site than those that this token is bound to: nothing of "
+                      "it was imported");
+  }
   /// One that is here is of the site that it has here.
   Result<bool> takes_building(const BundleRow& row) {
     const auto id = id_of<BuildingId>(row.at(0));
@@ -253,8 +263,8 @@ class ScopedBundles final : public BundleStore {
 
 std::unique_ptr<BundleStore> scoped_bundles(const Stores& all, MissionStore& missions,
                                             CalibrationStore& calibrations, PlaceStore& places) {
-  return std::make_unique<ScopedBundles>(all.bundles,
-                                         Seen{missions, calibrations, all.calibrations, places, all.places});
+  return std::make_unique<ScopedBundles>(
+      all.bundles, Seen{missions, all.missions, calibrations, all.calibrations, places, all.places});
 }
 
 }  // namespace anchord::api

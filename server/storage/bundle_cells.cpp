@@ -64,7 +64,7 @@ bool same(const BundleCell& a, const BundleCell& b) {
   const auto* x = std::get_if<double>(&a);
   const auto* y = std::get_if<double>(&b);
   if (x != nullptr && y != nullptr)
-    return std::bit_cast<std::uint64_t>(*x) == std::bit_cast<std::uint64_t>(*y);
+    return *x == *y || std::bit_cast<std::uint64_t>(*x) == std::bit_cast<std::uint64_t>(*y);
   return a == b;
 }
 

@@ -16,7 +16,7 @@ BundleRow read_row(Query& query, const BundleTable& table);
 std::optional<CirDigest> read_moved(Query& query, const BundleSpec& spec);
 void bind_cell(Query& query, const BundleCell& cell, CellKind kind);
 
-/// Bit for bit.
+/// Bit for bit, but that SQLite does not keep the sign of a zero, which PostgreSQL does.
 bool same(const BundleCell& a, const BundleCell& b);
 Uuid uuid_of(const BundleCell& cell);
 std::int64_t whole_of(const BundleCell& cell);

@@ -2,11 +2,13 @@
 
 #include <map>
 #include <set>
+#include <utility>
 
 #include "core/types/mission.hpp"
 #include "server/storage/bundle_cells.hpp"
 #include "server/storage/bundle_cir.hpp"
-#include "server/storage/measurement_rows.hpp"
+#include "server/storage/bundle_writer.hpp"
+#include "server/storage/measurement_sums.hpp"
 #include "server/storage/site_quota.hpp"
 #include "server/storage/stores.hpp"
 
@@ -17,18 +19,6 @@ namespace {
 constexpr std::size_t k_weight = 20'000;
 
 constexpr const char* k_mission_state = "SELECT state, name FROM mission WHERE mission_key = ?1";
-constexpr const char* k_sites =
-    "SELECT s.id FROM site s WHERE s.id IN (SELECT m.site_id FROM mission m WHERE m.mission_key = ?1) OR "
-    "s.id "
-    "IN (SELECT a.site_id FROM anchor a JOIN device_seen d ON d.network_id = a.network_id WHERE "
-    "d.mission_key "
-    "= ?1 AND d.kind = 1)";
-constexpr const char* k_plans = "SELECT id, site_id FROM plan";
-constexpr const char* k_procedure = "SELECT state_json FROM mission_procedure WHERE mission_key = ?1";
-constexpr const char* k_models = "SELECT id FROM model";
-constexpr const char* k_provenance =
-    "SELECT c.settings_json, c.provenance_json FROM calibration c JOIN calibration_mission m ON "
-    "m.calibration_key = c.calibration_key WHERE m.mission_key = ?1";
 constexpr const char* k_any_mission = "SELECT mission_key FROM mission WHERE id = ?1";
 constexpr const char* k_any_site = "SELECT 1 FROM site WHERE id = ?1";
 constexpr const char* k_insert_cir =
@@ -39,102 +29,6 @@ constexpr const char* k_count_fixes_anew =
     "INSERT INTO mission_fixes (mission_key, n_fixes) SELECT mission_key, count(*) FROM fix WHERE "
     "mission_key = "
     "?1 GROUP BY mission_key";
-
-/// What else the rows of a flight name, so that it stands whole on another server.
-struct Named {
-  std::set<Uuid> sites, plans, models;
-};
-
-std::string all_text(Connection& c, const char* sql, std::int64_t mission) {
-  Query query(c, sql);
-  query << mission;
-  std::string text;
-  while (query.step()) text += query.text() + '\n';
-  return text;
-}
-
-Named named_by(Connection& c, std::int64_t mission) {
-  Named out;
-  const std::string flown = all_text(c, k_procedure, mission);
-  std::string told;
-  {
-    Query query(c, k_provenance);
-    query << mission;
-    while (query.step()) {
-      told += query.text();
-      told += query.text();
-    }
-  }
-  {
-    Query query(c, k_sites);
-    query << mission;
-    while (query.step()) out.sites.insert(query.id<SiteId>().uuid);
-  }
-  {
-    Query query(c, k_plans);
-    while (query.step()) {
-      const Uuid id = query.id<SiteId>().uuid;
-      const auto site = query.maybe([&] { return query.id<SiteId>().uuid; });
-      if (flown.find(to_string(id)) == std::string::npos) continue;
-      out.plans.insert(id);
-      if (site) out.sites.insert(*site);
-    }
-  }
-  Query query(c, k_models);
-  while (query.step()) {
-    const Uuid id = query.id<ModelId>().uuid;
-    if (told.find(to_string(id)) != std::string::npos) out.models.insert(id);
-  }
-  return out;
-}
-
-class Writer {
- public:
-  Writer(Connection& c, const MissionId& id, std::int64_t mission, const CirFolder& files, BundleSink& sink)
-      : c_(c), id_(id), mission_(mission), named_(named_by(c, mission)), archive_(files), sink_(sink) {}
-  std::optional<Error> run() {
-    for (const auto& spec : bundle_specs()) {
-      if (auto begun = sink_.begin(spec.table); !begun) return begun.error();
-      const std::set<Uuid>* each = spec.part == BundlePart::site    ? &named_.sites
-                                   : spec.part == BundlePart::plan  ? &named_.plans
-                                   : spec.part == BundlePart::model ? &named_.models
-                                                                    : nullptr;
-      if (each == nullptr) {
-        if (auto error = rows(spec, nullptr)) return error;
-        continue;
-      }
-      for (const Uuid& id : *each)
-        if (auto error = rows(spec, &id)) return error;
-    }
-    return std::nullopt;
-  }
-
- private:
-  std::optional<Error> rows(const BundleSpec& spec, const Uuid* of) {
-    Query query(c_, spec.select);
-    if (of == nullptr)
-      query << mission_;
-    else
-      query << SiteId{*of};
-    while (query.step()) {
-      BundleRow row = read_row(query, spec.table);
-      if (const auto moved = read_moved(query, spec)) {
-        const auto cir = archive_.find(identity_of(spec, row, id_), *moved);
-        if (!cir) return cir.error();
-        put_cir(row, cir.value());
-      }
-      if (auto written = sink_.row(row); !written) return written.error();
-    }
-    return std::nullopt;
-  }
-
-  Connection& c_;
-  const MissionId id_;
-  const std::int64_t mission_;
-  const Named named_;
-  CirFinder archive_;
-  BundleSink& sink_;
-};
 
 /// One import, inside one transaction.
 class Reader {
@@ -153,6 +47,9 @@ class Reader {
       return make_error(Errc::conflict,
                         "mission " + to_string(mission_) +
                             " is in the bin of this server: restore it, or remove it permanently");
+    if (!fresh_) {
+      BOOST_OUTCOME_TRYV(check_landed());
+    }
     BOOST_OUTCOME_TRY(leave_out_calibrations());
     BOOST_OUTCOME_TRY(leave_out_revisions());
     BOOST_OUTCOME_TRY(leave_out_profiles());
@@ -182,6 +79,17 @@ class Reader {
   }
 
  private:
+  /// A flight that records has rows in memory too.
+  Result<void> check_landed() {
+    Query query(c_, k_mission_state);
+    query << key_.value();
+    if (query.step() && query.one_of(k_mission_state_words) == MissionState::recording)
+      return make_error(Errc::conflict, "mission " + to_string(mission_) +
+                                            " is recording on this server: finish it first, then send the "
+                                            "bundle again; nothing was imported");
+    return boost::outcome_v2::success();
+  }
+
   /// Those made with flights that are not here stay out: their rows would name nobody.
   Result<void> leave_out_calibrations() {
     const BundleSpec& spec = spec_named("calibration_mission");
@@ -208,11 +116,13 @@ class Reader {
     const BundleSpec& revision = spec_named("revision");
     BOOST_OUTCOME_TRY(source_.open(revision.table));
     BundleRow row;
-    bool whole = true;
+    bool whole = true, others = false;
     for (;;) {
       BOOST_OUTCOME_TRY(const bool more, source_.next(row));
       if (!more) break;
       theirs.insert(whole_of(row[0]));
+      if (const auto here = stored(revision, row))
+        others = others || !differing(revision, *here, row).empty();
       whole = whole && !calibrations_out_.contains(uuid_of(row[1]));
     }
     BOOST_OUTCOME_TRY(source_.open(spec_named("revision_position").table));
@@ -224,7 +134,6 @@ class Reader {
     for (const std::int64_t number : named) whole = whole && theirs.contains(number);
     Query query(c_, k_revisions);
     while (query.step()) mine.insert(query.integer());
-    bool others = false;
     for (const std::int64_t number : mine) others = others || !theirs.contains(number);
     revisions_out_ = others || !whole;
     if (!revisions_out_) return boost::outcome_v2::success();
@@ -256,6 +165,7 @@ class Reader {
     BundleOutcome::Table counted{spec.table.name, 0, 0};
     BOOST_OUTCOME_TRY(source_.open(spec.table));
     BundleRow row;
+    if (spec.part == BundlePart::counted && !fresh_) sums_.store(c_);
     for (;;) {
       BOOST_OUTCOME_TRY(const bool more, source_.next(row));
       if (!more) break;
@@ -270,9 +180,7 @@ class Reader {
     if (spec.part == BundlePart::mission && counted.n_rows != 1)
       return make_error(Errc::invalid_argument,
                         "a bundle must have one mission, this one has " + std::to_string(counted.n_rows));
-    if (spec.part == BundlePart::measured && !fresh_) {
-      BOOST_OUTCOME_TRY(same_count(spec, counted.n_rows));
-    }
+    if (spec.part == BundlePart::declared && !fresh_) note_more_here(spec, counted.n_rows);
     out_.tables.push_back(std::move(counted));
     return boost::outcome_v2::success();
   }
@@ -285,6 +193,7 @@ class Reader {
   }
 
   void note_added(const BundleSpec& spec, const BundleRow& row) {
+    if (spec.part == BundlePart::measured && !fresh_) return note_grown(spec, row);
     const std::string& table = spec.table.name;
     const bool anchor = table == "anchor", mission = table == "mission";
     if (anchor || mission) {
@@ -345,18 +254,19 @@ class Reader {
       BOOST_OUTCOME_TRY(check_mission(spec, row));
     }
     // What belongs to a flight that came just now cannot be here yet.
-    const bool nothing_yet = fresh_ && (spec.part == BundlePart::measured || spec.part == BundlePart::own);
-    if (!nothing_yet) {
-      if (const auto here = stored(spec, row)) {
+    if (!fresh_ || !is_of_flight(spec.part)) {
+      const auto here = stored(spec, row);
+      if (spec.part == BundlePart::counted) return counted_here(spec, here, row);
+      if (here) {
         if (const auto column = differing(spec, *here, row); !column.empty()) {
           BOOST_OUTCOME_TRY(stays(spec, row, column));
         }
         return false;
       }
-      if (spec.part == BundlePart::measured)
-        return make_error(Errc::conflict, "mission " + to_string(mission_) +
-                                              " exists on this server without " + name_of(spec, row) +
-                                              " of the bundle: it is another flight with the same id");
+      if (spec.part == BundlePart::declared) {
+        out_.left_out.push_back({name_of(spec, row), "the flight has none on this server, which stays"});
+        return false;
+      }
     }
     if (spec.table.name == "local_frame" && frame_named(row[1])) {
       out_.left_out.push_back({name_of(spec, row), "another frame has the name " +
@@ -367,6 +277,24 @@ class Reader {
     BOOST_OUTCOME_TRY(add(spec, row));
     note_added(spec, row);
     return true;
+  }
+
+  /// Of a radio, after what was measured with it was added: no less than the bundle's rows make.
+  Result<bool> counted_here(const BundleSpec& spec, const std::optional<BundleRow>& here,
+                            const BundleRow& row) const {
+    const auto at = [](const BundleRow& of, std::size_t i) { return whole_of(of[i]); };
+    if (here && at(*here, 2) <= at(row, 2) && at(*here, 3) >= at(row, 3) && at(*here, 4) >= at(row, 4))
+      return false;
+    return make_error(Errc::conflict, "mission " + to_string(mission_) + ": " + name_of(spec, row) +
+                                          " does not agree with the measurements; nothing was imported");
+  }
+
+  /// Rows that come late for a flight are stored beyond a quota too.
+  void note_grown(const BundleSpec& spec, const BundleRow& row) {
+    if (!spec.with_cir) return sums_.note(key_.value(), Fix{});
+    Range range = identity_of(spec, row, mission_);
+    range.kind = static_cast<RangeKind>(whole_of(row[0]));
+    sums_.note(key_.value(), range);
   }
 
   Result<void> check_mission(const BundleSpec& spec, const BundleRow& row) const {
@@ -416,29 +344,40 @@ class Reader {
     return query.step();
   }
 
-  /// The first column in which they differ; empty: none.
+  /// The first column in which they differ; of a flight all of them; empty: none.
   static std::string differing(const BundleSpec& spec, const BundleRow& here, const BundleRow& row) {
-    for (std::size_t i = 0; i < row.size(); ++i)
-      if (!same(here[i], row[i])) return spec.table.columns[i].name;
-    return {};
+    std::string columns;
+    for (std::size_t i = 0; i < row.size(); ++i) {
+      const std::string& name = spec.table.columns[i].name;
+      // It differs where a client sent the same to both.
+      if (same(here[i], row[i]) || (spec.part == BundlePart::measured && name == "received_t_ns")) continue;
+      columns += (columns.empty() ? "" : ", ") + name;
+      if (spec.part != BundlePart::mission) break;
+    }
+    return columns;
   }
 
-  /// Sites, plans and anchors are edited on every server, and no measurement rests on their words: what is
-  /// here stays, and the flight comes all the same.
-  Result<void> stays(const BundleSpec& spec, const BundleRow& row, const std::string& column) {
+  /// Sites, plans and anchors are edited on every server, and what was declared of a flight is corrected; no
+  /// measurement rests on their words: what is here stays, and the flight comes all the same.
+  Result<void> stays(const BundleSpec& spec, const BundleRow& row, const std::string& columns) {
     const std::string what = name_of(spec, row);
-    // What was declared of a flight may have been corrected on one of the two servers.
-    const std::string remedy =
-        spec.table.name == "mission"
-            ? "; correct it here as it was there (PATCH /missions/{id}) and import again"
-            : "";
+    if (spec.part == BundlePart::mission && (names(columns, "frame") || names(columns, "created_t_ns")))
+      return make_error(Errc::conflict, what + " exists on this server with other content (" + columns +
+                                            "): it is another flight with the same id; nothing was imported");
     if (!is_edited(spec.part))
-      return make_error(Errc::conflict, what + " exists on this server with other content (" + column +
-                                            "); nothing was imported" + remedy);
+      return make_error(Errc::conflict, what + " of mission " + to_string(mission_) +
+                                            " exists on this server with other content (" + columns +
+                                            "); nothing was imported");
     if (spec.table.name == "anchor") anchors_out_.insert(row[0]);
+    // One line of it is enough: there may be thousands.
+    if (spec.table.name == "procedure_log" && std::exchange(log_differs_, true))
+      return boost::outcome_v2::success();
     out_.left_out.push_back(
-        {what, "it exists on this server with other content (" + column + "), which stays"});
+        {what, "it exists on this server with other content (" + columns + "), which stays"});
     return boost::outcome_v2::success();
+  }
+  static bool names(const std::string& columns, std::string_view name) {
+    return (", " + columns + ",").find(", " + std::string(name) + ",") != std::string::npos;
   }
 
   Result<void> add(const BundleSpec& spec, const BundleRow& row) {
@@ -474,14 +413,14 @@ class Reader {
     query.run();
   }
 
-  Result<void> same_count(const BundleSpec& spec, std::uint64_t n_rows) {
+  void note_more_here(const BundleSpec& spec, std::uint64_t n_rows) {
     Query query(c_, spec.count);
     query << key_.value();
     const std::uint64_t here = query.step() ? query.as<std::uint64_t>() : 0;
-    if (here == n_rows) return boost::outcome_v2::success();
-    return make_error(Errc::conflict, "mission " + to_string(mission_) + " exists on this server with " +
-                                          std::to_string(here) + " rows of " + spec.table.name + ", not " +
-                                          std::to_string(n_rows) + "; nothing was imported");
+    if (here > n_rows)
+      out_.left_out.push_back({spec.table.name, "the flight has " + std::to_string(here) +
+                                                    " on this server, not " + std::to_string(n_rows) +
+                                                    ", which stay"});
   }
 
   static const BundleSpec& spec_named(std::string_view name) {
@@ -493,7 +432,8 @@ class Reader {
   const MissionId mission_;
   BundleSource& source_;
   std::optional<std::int64_t> key_;
-  bool fresh_{false}, revisions_out_{false};
+  bool fresh_{false}, revisions_out_{false}, log_differs_{false};
+  MeasurementSums sums_;  ///< of what was added to a flight that was here
   std::set<Uuid> calibrations_out_;
   std::set<BundleCell> profiles_out_, anchors_out_;  ///< kits by name, anchors by the id of the bundle
   std::set<BundleCell> places_added_;                ///< floors and pictures
@@ -521,7 +461,8 @@ class SqlBundleStore final : public BundleStore {
       if (query.step() && query.one_of(k_mission_state_words) == MissionState::recording)
         return make_error(Errc::conflict,
                           query.text() + " is recording: finish it first, then take its bundle");
-      return Writer(c, mission, *key, files_, sink).run();
+      if (auto written = write_flight(c, mission, *key, files_, sink); !written) return written.error();
+      return std::nullopt;
     });
     if (error) return *error;
     return boost::outcome_v2::success();

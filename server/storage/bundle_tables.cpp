@@ -59,12 +59,12 @@ constexpr std::array k_lines{
          "u id u site_id t name t kit t radio i frame i track_point i state i created_t_ns i finished_t_ns "
          "lr lever_arm_sigma_m",
          "id", k_of_flight, "t.mission_key"},
-    Line{BundlePart::measured, "mission_tag",
+    Line{BundlePart::declared, "mission_tag",
          "mission i ordinal i tag i antenna r lever_arm_forward_m r lever_arm_left_m r lever_arm_up_m",
          "ordinal", k_of_flight, "t.ordinal"},
-    Line{BundlePart::own, "mission_procedure", "mission t state_json i changed_t_ns", "", k_of_flight,
+    Line{BundlePart::noted, "mission_procedure", "mission t state_json i changed_t_ns", "", k_of_flight,
          "t.mission_key"},
-    Line{BundlePart::own, "procedure_log+", "mission i number i t_ns t topic t message_json", "number",
+    Line{BundlePart::noted, "procedure_log+", "mission i number i t_ns t topic t message_json", "number",
          k_of_flight, "t.number"},
     Line{BundlePart::measured, "uwb_range",
          "mission i kind i t_ns i received_t_ns i tag i antenna i anchor i seq r distance_m r rss_dbm "
@@ -77,7 +77,7 @@ constexpr std::array k_lines{
          "r enu_from_body_x r enu_from_body_y r enu_from_body_z r enu_from_body_w r correction_age_s "
          "i satellites",
          "t_ns seq?", k_of_flight, "t.fix_id"},
-    Line{BundlePart::measured, "device_seen",
+    Line{BundlePart::counted, "device_seen",
          "mission i network_id i kind i first_t_ns i last_t_ns i n_ranges", "network_id kind", k_of_flight,
          "t.network_id, t.kind"},
     Line{BundlePart::own, "exclusion",
@@ -87,7 +87,7 @@ constexpr std::array k_lines{
     Line{BundlePart::own, "exclusion_row", "k exclusion i t_ns i tag i anchor i antenna",
          "exclusion_id t_ns tag anchor antenna", k_of_exclusions,
          "t.exclusion_key, t.t_ns, t.tag, t.anchor, t.antenna"},
-    Line{BundlePart::own, "exclusion_taken_back", "k exclusion t reason i t_ns t taken_back_by",
+    Line{BundlePart::noted, "exclusion_taken_back", "k exclusion t reason i t_ns t taken_back_by",
          "exclusion_id", k_of_exclusions, "t.exclusion_key"},
     Line{BundlePart::model, "model",
          "u id t task t method t sha256_hex t manifest_json i created_t_ns t created_by", "id", "t.id = ?1",

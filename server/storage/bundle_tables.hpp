@@ -16,15 +16,24 @@ enum class BundlePart : std::uint8_t {
   model,        ///< one model a query
   shared,       ///< of other flights too
   mission,      ///< the flight itself
-  measured,     ///< never changes after the flight: all there, or none
-  own,          ///< of the flight; more may come later
+  declared,     ///< typed for the flight as a whole: all of it is as it is here
+  measured,     ///< never changes; more may come after the flight
+  counted,      ///< of what was measured; grows by what is added
+  own,          ///< of the flight, never changes; more may come later
+  noted,        ///< of the flight; more may come later, and each server may have its own word
   calibration,  ///< with a calibration, which may be left out
   revision,     ///< with a revision, which may be left out
 };
 
-/// Parts that every server edits for itself.
+/// Parts that every server has its own word of: what is here stays.
 constexpr bool is_edited(BundlePart part) {
-  return part == BundlePart::site || part == BundlePart::plan || part == BundlePart::shared;
+  return part == BundlePart::site || part == BundlePart::plan || part == BundlePart::shared ||
+         part == BundlePart::mission || part == BundlePart::declared || part == BundlePart::noted;
+}
+/// Parts that cannot be here where the flight is not.
+constexpr bool is_of_flight(BundlePart part) {
+  return part == BundlePart::declared || part == BundlePart::measured || part == BundlePart::counted ||
+         part == BundlePart::own || part == BundlePart::noted;
 }
 
 /// One column of a bundle in SQL.

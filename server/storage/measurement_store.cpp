@@ -1,23 +1,14 @@
 #include <charconv>
 #include <map>
-#include <tuple>
 
 #include "server/storage/measurement_rows.hpp"
+#include "server/storage/measurement_sums.hpp"
 #include "server/storage/stores.hpp"
 
 namespace anchord::sql {
 namespace {
 
 constexpr const char* k_mission_id = "SELECT id FROM mission WHERE mission_key = ?1";
-constexpr const char* k_note_device =
-    "INSERT INTO device_seen (mission_key, network_id, kind, first_t_ns, last_t_ns, n_ranges) "
-    "VALUES (?1, ?2, ?3, ?4, ?5, ?6) "
-    "ON CONFLICT (mission_key, network_id, kind) DO UPDATE SET "
-    "first_t_ns = CASE WHEN excluded.first_t_ns < device_seen.first_t_ns THEN excluded.first_t_ns "
-    "ELSE device_seen.first_t_ns END, "
-    "last_t_ns = CASE WHEN excluded.last_t_ns > device_seen.last_t_ns THEN excluded.last_t_ns "
-    "ELSE device_seen.last_t_ns END, "
-    "n_ranges = device_seen.n_ranges + excluded.n_ranges";
 constexpr const char* k_devices_of_mission =
     "SELECT d.network_id, d.kind, m.id, d.first_t_ns, d.last_t_ns, d.n_ranges "
     "FROM device_seen d JOIN mission m ON m.mission_key = d.mission_key "
@@ -35,9 +26,6 @@ constexpr const char* k_count_ranges =
 constexpr const char* k_count_all_ranges =
     "SELECT CAST(coalesce(sum(n_ranges), 0) AS BIGINT) / 2 FROM device_seen WHERE mission_key NOT IN (SELECT "
     "mission_key FROM mission_bin)";
-constexpr const char* k_note_fixes =
-    "INSERT INTO mission_fixes (mission_key, n_fixes) VALUES (?1, ?2) "
-    "ON CONFLICT (mission_key) DO UPDATE SET n_fixes = mission_fixes.n_fixes + excluded.n_fixes";
 constexpr const char* k_count_fixes = "SELECT n_fixes FROM mission_fixes WHERE mission_key = ?1";
 
 class Keys {
@@ -55,47 +43,6 @@ class Keys {
   Connection& connection_;
   std::map<MissionId, std::optional<std::int64_t>> known_;
   std::optional<std::pair<MissionId, std::optional<std::int64_t>>> last_;
-};
-
-/// Sums of one append, so that each device, and the count of a mission's fixes, costs one statement a call
-/// and not one a row.
-class Sums {
- public:
-  void note(std::int64_t key, const Range& row) {
-    add({key, row.anchor.value, DeviceSeen::Kind::anchor}, row.time);
-    add({key, row.tag.value,
-         row.kind == RangeKind::tag_anchor ? DeviceSeen::Kind::tag : DeviceSeen::Kind::anchor},
-        row.time);
-  }
-  void note(std::int64_t key, const Fix&) { ++fixes_[key]; }
-  void store(Connection& connection) const {
-    for (const auto& [key, n] : fixes_) {
-      Query query(connection, k_note_fixes);
-      query << key << n;
-      query.run();
-    }
-    for (const auto& [device, seen] : seen_) {
-      const auto& [key, network_id, kind] = device;
-      Query query(connection, k_note_device);
-      query << key << NetworkId{network_id} << static_cast<int>(kind) << seen.first << seen.last << seen.n;
-      query.run();
-    }
-  }
-
- private:
-  struct Seen {
-    UtcTime first{}, last{};
-    std::int64_t n{0};
-  };
-  using Device = std::tuple<std::int64_t, std::uint32_t, DeviceSeen::Kind>;
-  void add(const Device& device, UtcTime time) {
-    auto [it, fresh] = seen_.try_emplace(device, Seen{time, time, 0});
-    it->second.first = std::min(it->second.first, time);
-    it->second.last = std::max(it->second.last, time);
-    ++it->second.n;
-  }
-  std::map<Device, Seen> seen_;
-  std::map<std::int64_t, std::int64_t> fixes_;  // by mission
 };
 
 /// A row of the call whose mission is known.
@@ -163,7 +110,7 @@ void append_rows(Connection& connection, const std::vector<Row>& rows, std::vect
   });
   // Before rows are compared with what is stored, which may be one of these.
   store_cirs(connection, rows, known, ids);
-  Sums sums;
+  MeasurementSums sums;
   for (std::size_t i = 0; i < known.size(); ++i) {
     const Row& row = rows[known[i].at];
     auto& outcome = outcomes[known[i].at];

@@ -134,7 +134,7 @@ TEST_F(Bundles, AreRefusedWhereAMeasurementDiffersButNotWhereASiteWasRenamed) {
   EXPECT_EQ(json(again)["left_out"][0]["what"], "site " + to_string(site.id));
   EXPECT_EQ(other.stores().sites.site(site.id).value().name, "renamed here");
   // A range that was measured otherwise: the flight is another one.
-  const auto measured = post("/api/v1/bundles", forged("uwb_range", ",0,", ",3,"), "application/zip");
+  const auto measured = post("/api/v1/bundles", forged("uwb_range", "\n[0,", "\n[1,"), "application/zip");
   EXPECT_EQ(measured.status, 409) << measured.body;
   EXPECT_NE(measured.body.find(to_string(id_)), std::string::npos) << measured.body;
 }

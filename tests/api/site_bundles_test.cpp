@@ -93,6 +93,7 @@ TEST_F(Bundles, OfASiteBringItsFlightsAndWhatNoFlightUsed) {
   OtherServer third;
   auto other_flight = mission;
   other_flight.site.reset();
+  other_flight.created.ns += 1;
   other_flight.state = MissionState::recording;
   ASSERT_TRUE(third.stores().missions.insert(other_flight));
   ASSERT_TRUE(third.stores().missions.finish(id_, clock_.now()));

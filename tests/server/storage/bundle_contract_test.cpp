@@ -1,4 +1,6 @@
 // A flight as rows for another server, over every backend, and from each to SQLite and back.
+#include <algorithm>
+
 #include "core/ports/anchor_store.hpp"
 #include "core/ports/exclusion_store.hpp"
 #include "core/ports/frame_store.hpp"
@@ -61,6 +63,38 @@ class BundleStoreContract : public StoreContract {
     for (const auto& one : outcome.left_out) out.push_back(one.what + ": " + one.why);
     return out;
   }
+  static std::map<std::string, std::uint64_t> added(const BundleOutcome& outcome) {
+    std::map<std::string, std::uint64_t> out;
+    for (const auto& table : outcome.tables)
+      if (table.n_added > 0) out[table.name] = table.n_added;
+    return out;
+  }
+  /// Of a finished flight: ranges earlier and later than all others, one of an anchor that was not heard, one
+  /// with an impulse response; and positions.
+  static bool append_late(Database& db, const MissionId& mission) {
+    std::vector<Range> ranges{range_at(mission, -7), range_at(mission, 60), range_at(mission, 61)};
+    ranges[0].seq.reset();
+    ranges[1].anchor = NetworkId{0x6a99};
+    ranges[2].cir.emplace();
+    ranges[2].cir->re_im = {5, -5};
+    const std::vector<Fix> fixes{fix_at(mission, 3), fix_at(mission, 4)};
+    const Stores s = db.stores();
+    return s.measurements.append_ranges(ranges, true).has_value() &&
+           s.measurements.append_fixes(fixes, true).has_value();
+  }
+  /// What is measured, whatever the order in which it came, and what is counted of it.
+  static void expect_same_measurements(Database& a, Database& b, const MissionId& mission) {
+    BundleRows one = written(a, mission), other = written(b, mission);
+    for (auto* rows : {&one, &other}) {
+      for (const char* table : {"uwb_range", "fix"}) {
+        const std::size_t received = table == std::string("fix") ? 1 : 2;
+        for (auto& row : rows->tables[table]) row[received] = std::monostate{};
+        std::ranges::sort(rows->tables[table]);
+      }
+    }
+    for (const char* table : {"uwb_range", "fix", "device_seen"})
+      EXPECT_EQ(one.tables[table], other.tables[table]) << table;
+  }
   static BundleRows written(Database& db, const MissionId& mission) {
     BundleRows rows;
     const auto done = db.stores().bundles.write_out(mission, rows);
@@ -119,11 +153,14 @@ TEST_P(BundleStoreContract, AreTakenFromSqlite) {
 TEST_P(BundleStoreContract, AreRefusedWholeWhereAMeasurementDiffers) {
   const auto mission = flown();
   BundleRows rows = written(*db_, mission);
-  rows.tables["uwb_range"].pop_back();
-  const auto fewer = db_->stores().bundles.take_in(mission, rows);
-  ASSERT_FALSE(fewer);
-  EXPECT_EQ(fewer.error().code, Errc::conflict);
-  EXPECT_NE(fewer.error().message.find("40 rows of uwb_range"), std::string::npos) << fewer.error().message;
+  auto& distance_m = std::get<double>(rows.tables["uwb_range"][39][7]);
+  EXPECT_EQ(distance_m, 5.039);
+  distance_m += 0.001;
+  const auto differs = db_->stores().bundles.take_in(mission, rows);
+  ASSERT_FALSE(differs);
+  EXPECT_EQ(differs.error().code, Errc::conflict);
+  for (const char* part : {"uwb_range 1777889472735678000 0x6e01 0x0103", "(distance_m)"})
+    EXPECT_NE(differs.error().message.find(part), std::string::npos) << differs.error().message;
   ScratchDir folder;
   const auto other = open_sqlite(folder.path() / "data");
   rows.tables["estimate"][0][0] = std::string(16, '\0');  // of a calibration that is nowhere
@@ -193,6 +230,143 @@ TEST_P(BundleStoreContract, LeaveSitesFramesAndAnchorsAsTheyAreHere) {
   EXPECT_EQ(here.anchors.anchor(NetworkId{0x101}).value().name, "");
   EXPECT_EQ(written(*other, mission).tables.at("uwb_range"), rows.tables.at("uwb_range"));
   EXPECT_FALSE(here.bundles.take_in(mission, rows).value().added());
+}
+
+// A second bundle of a flight with more rows was refused for ever with 409 "exists on this server without".
+TEST_P(BundleStoreContract, BringRowsThatCameLateOnceAndCountThemAsTheyAre) {
+  const auto mission = flown();
+  BundleRows first = written(*db_, mission);
+  ScratchDir folder;
+  const auto other = open_sqlite(folder.path() / "data");
+  ASSERT_TRUE(other->stores().bundles.take_in(mission, first));
+  ASSERT_TRUE(append_late(*db_, mission));
+  BundleRows more = written(*db_, mission);
+  const auto taken = other->stores().bundles.take_in(mission, more);
+  ASSERT_TRUE(taken) << taken.error().message;
+  EXPECT_EQ(added(taken.value()), (std::map<std::string, std::uint64_t>{{"fix", 2}, {"uwb_range", 3}}));
+  EXPECT_TRUE(taken.value().left_out.empty());
+  expect_same_measurements(*other, *db_, mission);
+  EXPECT_EQ(other->stores().measurements.count_ranges(mission).value(), 43u);
+  EXPECT_EQ(other->stores().measurements.count_fixes(mission).value(), 2u);
+  for (BundleRows* again : {&more, &first}) {
+    const auto there = other->stores().bundles.take_in(mission, *again);
+    ASSERT_TRUE(there) << there.error().message;
+    EXPECT_FALSE(there.value().added());
+  }
+  expect_same_measurements(*other, *db_, mission);
+}
+
+TEST_P(BundleStoreContract, OfOneFlightWithRowsThatCameLateToEachServerMakeTheSameOfBoth) {
+  const auto mission = flown();
+  BundleRows first = written(*db_, mission);
+  ScratchDir folder;
+  const auto other = open_sqlite(folder.path() / "data");
+  ASSERT_TRUE(other->stores().bundles.take_in(mission, first));
+  ASSERT_TRUE(append_late(*db_, mission));
+  std::vector<Range> theirs{range_at(mission, 100), range_at(mission, 60)};
+  theirs[1].anchor = NetworkId{0x6a99};
+  theirs[1].received = k_noon;  // sent to both: it arrived at another time
+  ASSERT_TRUE(other->stores().measurements.append_ranges(theirs, true));
+  BundleRows here = written(*db_, mission), there = written(*other, mission);
+  ASSERT_TRUE(other->stores().bundles.take_in(mission, here));
+  ASSERT_TRUE(db_->stores().bundles.take_in(mission, there));
+  EXPECT_EQ(db_->stores().measurements.count_ranges(mission).value(), 44u);
+  expect_same_measurements(*other, *db_, mission);
+}
+
+TEST_P(BundleStoreContract, WithALateRowThatDiffersBringNoneOfTheOthers) {
+  const auto mission = flown();
+  BundleRows first = written(*db_, mission);
+  ScratchDir folder;
+  const auto other = open_sqlite(folder.path() / "data");
+  ASSERT_TRUE(other->stores().bundles.take_in(mission, first));
+  ASSERT_TRUE(append_late(*db_, mission));
+  BundleRows more = written(*db_, mission);
+  std::vector<Fix> moved{fix_at(mission, 4)};
+  moved[0].position.height_m += 1;
+  ASSERT_TRUE(other->stores().measurements.append_fixes(moved, true));
+  const auto refused = other->stores().bundles.take_in(mission, more);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, Errc::conflict);
+  EXPECT_NE(refused.error().message.find("fix 1777889472745678000"), std::string::npos)
+      << refused.error().message;
+  EXPECT_EQ(written(*other, mission).tables.at("uwb_range"), first.tables.at("uwb_range"));
+  EXPECT_EQ(other->stores().measurements.count_ranges(mission).value(), 40u);
+  BundleRows counted = written(*db_, mission);
+  std::get<std::int64_t>(counted.tables["device_seen"][0].back()) += 1;
+  counted.tables["fix"].clear();
+  const auto miscounted = other->stores().bundles.take_in(mission, counted);
+  ASSERT_FALSE(miscounted);
+  EXPECT_NE(miscounted.error().message.find("device_seen"), std::string::npos);
+}
+
+// Was refused with 409 and "correct it here as it was there".
+TEST_P(BundleStoreContract, LeaveAFlightThatWasCorrectedAsItIsHereAndBringItsRows) {
+  const auto mission = flown();
+  BundleRows first = written(*db_, mission);
+  ScratchDir folder;
+  const auto other = open_sqlite(folder.path() / "data");
+  ASSERT_TRUE(other->stores().bundles.take_in(mission, first));
+  auto corrected = other->stores().missions.mission(mission).value();
+  corrected.name = "named at the centre";
+  corrected.tags[0].lever_arm_body_m.x() = 0.5;
+  ASSERT_TRUE(other->stores().missions.update(corrected));
+  auto ours = db_->stores().missions.mission(mission).value();
+  ours.kit = "kit 2";
+  ours.tags.push_back({NetworkId{0x6e02}, 0, {0, 0, 0}});
+  ASSERT_TRUE(db_->stores().missions.update(ours));
+  ASSERT_TRUE(append_late(*db_, mission));
+  BundleRows more = written(*db_, mission);
+  const auto taken = other->stores().bundles.take_in(mission, more);
+  ASSERT_TRUE(taken) << taken.error().message;
+  EXPECT_THAT(left_out(taken.value()),
+              ::testing::UnorderedElementsAre(
+                  ::testing::AllOf(::testing::StartsWith("mission " + to_string(mission)),
+                                   ::testing::HasSubstr("(name, kit), which stays")),
+                  ::testing::AllOf(::testing::StartsWith("mission_tag 0"),
+                                   ::testing::HasSubstr("(lever_arm_forward_m), which stays")),
+                  ::testing::StartsWith("mission_tag 1")));
+  const auto there = other->stores().missions.mission(mission).value();
+  EXPECT_EQ(there.name, "named at the centre");
+  EXPECT_EQ(there.kit, "kit");
+  ASSERT_EQ(there.tags.size(), 1u);
+  EXPECT_EQ(there.tags[0].lever_arm_body_m.x(), 0.5);
+  expect_same_measurements(*other, *db_, mission);
+  BundleRows back = written(*other, mission);
+  const auto down = db_->stores().bundles.take_in(mission, back);
+  ASSERT_TRUE(down) << down.error().message;
+  EXPECT_THAT(left_out(down.value()),
+              ::testing::Contains(::testing::HasSubstr("has 2 on this server, not 1")));
+  back.tables["mission"][0][5] = std::int64_t{1};  // its rows are in another frame
+  EXPECT_EQ(db_->stores().bundles.take_in(mission, back).error().code, Errc::conflict);
+}
+
+TEST_P(BundleStoreContract, LeaveAnExclusionThatBothTookBackAsItIsHere) {
+  const auto mission = flown();
+  BundleRows rows = written(*db_, mission);
+  ScratchDir folder;
+  const auto other = open_sqlite(folder.path() / "data");
+  ASSERT_TRUE(other->stores().bundles.take_in(mission, rows));
+  rows.tables["exclusion_taken_back"][0][1] = std::string("another word");
+  const auto taken = other->stores().bundles.take_in(mission, rows);
+  ASSERT_TRUE(taken) << taken.error().message;
+  EXPECT_THAT(left_out(taken.value()), ::testing::ElementsAre(::testing::HasSubstr("exclusion_taken_back")));
+  rows.tables["exclusion"][0][7] = std::string("another reason");
+  EXPECT_EQ(other->stores().bundles.take_in(mission, rows).error().code, Errc::conflict);
+}
+
+// Where both had published one revision, their numbers were the same and the flight was refused with 409.
+TEST_P(BundleStoreContract, LeaveARevisionOfTheSameNumberOut) {
+  const auto mission = flown();
+  BundleRows rows = written(*db_, mission);
+  const auto here = std::exchange(db_, nullptr);
+  ScratchDir folder;
+  db_ = open_sqlite(folder.path() / "data");
+  const auto own = flown();
+  const auto taken = db_->stores().bundles.take_in(mission, rows);
+  ASSERT_TRUE(taken) << taken.error().message;
+  EXPECT_THAT(left_out(taken.value()), ::testing::Contains(::testing::HasSubstr("revision 1: this server")));
+  EXPECT_EQ(written(*db_, own).tables.at("revision").size(), 1u);
 }
 
 TEST_P(BundleStoreContract, AreOfFinishedMissionsAlone) {
