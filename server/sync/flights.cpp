@@ -83,6 +83,39 @@ class Flights {
     return boost::outcome_v2::success();
   }
 
+  /// Whether the target still has all of it: it may have been removed there since, or the target be another
+  /// one at the same address, or one that came back from an older backup.
+  Result<bool> is_there(const std::string& id) {
+    BOOST_OUTCOME_TRY(const auto theirs, run_.target().call({"GET", path_of("missions", id)}));
+    if (theirs.status != 200) return false;
+    BOOST_OUTCOME_TRY(const auto ours, run_.source().get(path_of("missions", id)));
+    const auto has = json_of(theirs);
+    for (const char* count : {"n_ranges", "n_fixes"}) {
+      const Json &here = member(ours, count), &there = member(has, count);
+      if (!here.is_number_unsigned() || !there.is_number_unsigned() ||
+          there.get<std::uint64_t>() < here.get<std::uint64_t>())
+        return false;
+    }
+    return has_exclusions(path_of("missions", id, "/exclusions?fields=id,included"));
+  }
+
+  /// Each that the source has, and taken back where it was.
+  Result<bool> has_exclusions(const std::string& path) {
+    BOOST_OUTCOME_TRY(const auto ours, run_.source().get(path));
+    if (member(ours, "items").empty()) return true;
+    BOOST_OUTCOME_TRY(const auto theirs, run_.target().call({"GET", path}));
+    if (theirs.status != 200) return false;
+    std::map<std::string, bool> taken_back;
+    for (const auto& exclusion : member(json_of(theirs), "items"))
+      taken_back[text_of(exclusion, "id")] = !member(exclusion, "included").is_null();
+    for (const auto& exclusion : member(ours, "items")) {
+      const auto there = taken_back.find(text_of(exclusion, "id"));
+      if (there == taken_back.end()) return false;
+      if (!member(exclusion, "included").is_null() && !there->second) return false;
+    }
+    return true;
+  }
+
   void later(const Json& mission) {
     ++run_.outcome.flights_recording;
     run_.report("flight \"" + text_of(mission, "name") + "\" is not finished: it is sent by a later run");
@@ -128,9 +161,8 @@ class Flights {
     if (fetched.answer.status != 200) return failed(name, fetched.answer);
     BOOST_OUTCOME_TRY(const auto bundle, read_bundle(id, target, std::move(fetched.file)));
     if (taken_.has(id, bundle.own_digest)) {
-      // It may have been removed there since, or the centre be another one at the same address.
-      BOOST_OUTCOME_TRY(const auto there, run_.target().call({"GET", path_of("missions", id)}));
-      if (there.status == 200) {
+      BOOST_OUTCOME_TRY(const bool there, is_there(id));
+      if (there) {
         sent_.emplace(id, false);
         return boost::outcome_v2::success();
       }

@@ -1,4 +1,5 @@
 // Sites without their flights: frames, plans, anchors, buildings, floors and pictures of their plans.
+#include <algorithm>
 #include <nlohmann/json.hpp>
 #include <set>
 
@@ -65,11 +66,37 @@ class Sites {
     return digest_of(run_.field, id, fetched.file);
   }
 
-  /// It may have been removed there since, or the centre be another one at the same address.
+  /// It may have been removed there since, or the centre be another one at the same address, or one that came
+  /// back from an older backup.
   Result<bool> has_been_sent(const std::string& id, const std::string& digest) {
     if (!run_.up() || !taken_.has(id, digest)) return false;
     BOOST_OUTCOME_TRY(const auto there, run_.target().call({"GET", path_of("sites", id)}));
-    return there.status == 200;
+    if (there.status != 200) return false;
+    BOOST_OUTCOME_TRY(const auto buildings, run_.field.list("/api/v1/buildings?fields=id&site=" + id));
+    BOOST_OUTCOME_TRY(bool all, has_all("/api/v1/buildings?fields=id&site=" + id, buildings, "id"));
+    for (const auto& building : buildings) {
+      if (!all) return false;
+      const auto path = "/api/v1/floors?fields=id&building=" + text_of(building, "id");
+      BOOST_OUTCOME_TRY(const auto floors, run_.field.list(path));
+      BOOST_OUTCOME_TRY(all, has_all(path, floors, "id"));
+    }
+    // A frame whose name another one has there stays out.
+    for (const auto& [kind, key] : {std::pair("plans", "id"), std::pair("frames", "name")}) {
+      if (!all) return false;
+      const auto path = "/api/v1/" + std::string(kind) + "?fields=site," + key;
+      BOOST_OUTCOME_TRY(auto listed, run_.field.list(path));
+      std::erase_if(listed, [&](const Json& one) { return text_of(one, "site") != id; });
+      BOOST_OUTCOME_TRY(all, has_all(path, listed, key));
+    }
+    return all;
+  }
+  /// Whether the centre lists all of these.
+  Result<bool> has_all(const std::string& path, const std::vector<Json>& ours, const char* key) {
+    if (ours.empty()) return true;
+    BOOST_OUTCOME_TRY(const auto theirs, run_.centre.list(path));
+    std::set<std::string> there;
+    for (const auto& one : theirs) there.insert(text_of(one, key));
+    return std::ranges::all_of(ours, [&](const Json& one) { return there.contains(text_of(one, key)); });
   }
 
   Result<void> send(const std::string& id, const std::string& what) {
