@@ -27,6 +27,12 @@ void print(const sql::TableDigest& table) {
               table.sha256_hex.c_str());
 }
 
+void say_served(const std::string& shown, const std::string& server) {
+  std::fprintf(stderr,
+               "anchord: server %s has %s and writes into it: what it stores from now on is left out\n",
+               printable(server).c_str(), printable(shown).c_str());
+}
+
 int migrate(const DatabaseOptions& options) {
   const auto version = migrate_database(options.from);
   if (!version) return failed_by_database(version.error());
@@ -35,13 +41,13 @@ int migrate(const DatabaseOptions& options) {
 }
 
 int check_databases(const DatabaseOptions& options) {
-  const auto here = digest_database(options.from);
+  const auto here = digest_database(options.from, say_served);
   if (!here) return failed_by_database(here.error());
   if (options.to.empty()) {
     for (const auto& table : here.value()) print(table);
     return 0;
   }
-  const auto there = digest_database(options.to);
+  const auto there = digest_database(options.to, say_served);
   if (!there) return failed_by_database(there.error());
   int differ = 0;
   for (std::size_t i = 0; i < here.value().size(); ++i) {
@@ -59,12 +65,12 @@ int check_databases(const DatabaseOptions& options) {
 int copy(const DatabaseOptions& options) {
   (void)interrupted();
   std::string told;
-  const auto done =
-      copy_database(options.from, options.to, options.folders, [&](const std::string& table, std::uint64_t) {
-        if (table != told) std::fprintf(stderr, "%s\n", table.c_str());
-        told = table;
-        return !interrupted();
-      });
+  const auto progress = [&](const std::string& table, std::uint64_t) {
+    if (table != told) std::fprintf(stderr, "%s\n", table.c_str());
+    told = table;
+    return !interrupted();
+  };
+  const auto done = copy_database(options.from, options.to, options.folders, progress, say_served);
   if (!done) return failed_by_database(done.error());
   for (const auto& table : done.value().tables) print(table);
   const CirCopies& cirs = done.value().cirs;

@@ -8,6 +8,7 @@
 #include "server/storage/postgres_connection.hpp"
 #include "server/storage/postgres_migrate.hpp"
 #include "server/storage/postgres_text.hpp"
+#include "server/storage/server_lease.hpp"
 #include "server/storage/sqlite_file.hpp"
 
 namespace anchord {
@@ -28,6 +29,7 @@ struct Place {
   std::string shown;
   std::unique_ptr<sql::DataFolder> folder{};  ///< of SQLite
   std::unique_ptr<Connection> connection{};
+  std::string server{};  ///< that writes into it; of PostgreSQL, where it is only read
 
   bool postgres() const { return folder == nullptr; }
   void begin_reading() const {
@@ -40,12 +42,36 @@ struct Place {
   }
 };
 
-Result<Place> open_postgres_place(const std::string& address) {
+/// What is done with a place: nothing but reading; changed; filled, from nothing if need be.
+enum class Use { read, change, fill };
+
+Error served(const Place& place, const std::string& server, const std::string& why) {
+  return make_error(Errc::conflict,
+                    "server " + server + " has " + place.shown + why +
+                        ": stop it first ('systemctl stop anchord' on its machine; a standby "
+                        "takes over, so stop that one before). One that was killed has it for "
+                        "some seconds more");
+}
+
+/// A server that has it goes on by tables and rows that it knows.
+Result<void> bring_up(Place& place, sql::PostgresConnection& connection, Use use) {
+  const auto server = sql::serving_server(connection);
+  if (!server) return sql::migrate_postgres(connection, postgresql_migrations(), SystemClock{}.now());
+  if (use != Use::read) return served(place, *server, "");
+  if (const int version = sql::postgres_version(connection); version != newest_schema_version())
+    return served(
+        place, *server,
+        " at version " + std::to_string(version) + ", not " + std::to_string(newest_schema_version()));
+  place.server = *server;
+  return boost::outcome_v2::success();
+}
+
+Result<Place> open_postgres_place(const std::string& address, Use use) {
   Place place{sql::shown_address(address)};
   if (const auto fault = sql::address_fault(address); !fault.empty())
     return make_error(Errc::invalid_argument, place.shown + ": " + fault);
   auto connection = std::make_unique<sql::PostgresConnection>(address);
-  BOOST_OUTCOME_TRYV(sql::migrate_postgres(*connection, postgresql_migrations(), SystemClock{}.now()));
+  BOOST_OUTCOME_TRYV(bring_up(place, *connection, use));
   place.connection = std::move(connection);
   return place;
 }
@@ -65,8 +91,11 @@ Result<Place> open_folder(const std::string& dir, bool fill) {
   return place;
 }
 
-Result<Place> open_place(const std::string& place, bool fill = false) {
-  return is_address(place) ? open_postgres_place(place) : open_folder(place, fill);
+Result<Place> open_place(const std::string& place, Use use, const ServedNotice& notice = {}) {
+  if (!is_address(place)) return open_folder(place, use == Use::fill);
+  BOOST_OUTCOME_TRY(auto opened, open_postgres_place(place, use));
+  if (notice && !opened.server.empty()) notice(opened.shown, opened.server);
+  return opened;
 }
 
 Result<void> ready(Place& to, const std::string& source, const std::vector<RowTable>& tables) {
@@ -194,26 +223,26 @@ auto without_throwing(F work) -> decltype(work()) {
 
 Result<int> migrate_database(const std::string& place) {
   return without_throwing([&]() -> Result<int> {
-    BOOST_OUTCOME_TRYV(open_place(place));
+    BOOST_OUTCOME_TRYV(open_place(place, Use::change));
     return newest_schema_version();
   });
 }
 
-Result<std::vector<sql::TableDigest>> digest_database(const std::string& place) {
+Result<std::vector<sql::TableDigest>> digest_database(const std::string& place, const ServedNotice& served) {
   return without_throwing([&]() -> Result<std::vector<sql::TableDigest>> {
-    BOOST_OUTCOME_TRY(auto opened, open_place(place));
+    BOOST_OUTCOME_TRY(auto opened, open_place(place, Use::read, served));
     opened.begin_reading();
     return digests(opened, sql::row_tables());
   });
 }
 
 Result<CopyReport> copy_database(const std::string& from, const std::string& to, const CopyFolders& folders,
-                                 const CopyProgress& progress) {
+                                 const CopyProgress& progress, const ServedNotice& served) {
   return without_throwing([&]() -> Result<CopyReport> {
-    BOOST_OUTCOME_TRY(auto source, open_place(from));
+    BOOST_OUTCOME_TRY(auto source, open_place(from, Use::read, served));
     if (source.unfinished())
       return make_error(Errc::unsupported, "a copy into " + source.shown + " has not been finished");
-    BOOST_OUTCOME_TRY(auto target, open_place(to, true));
+    BOOST_OUTCOME_TRY(auto target, open_place(to, Use::fill));
     const auto tables = sql::row_tables();
     BOOST_OUTCOME_TRYV(ready(target, source.shown, tables));
     BOOST_OUTCOME_TRY(auto report, copy_cirs(source, target, folders, progress));

@@ -9,15 +9,21 @@
 #include "server/storage/sqlite_database.hpp"
 
 /// Whole databases: brought to a version, compared, moved between a file of SQLite and PostgreSQL. A place is
-/// a data folder or postgresql://user@host/name; nobody else may have the folder, and no server should serve
-/// a database that is copied.
+/// a data folder or postgresql://user@host/name. Nobody else may have the folder. Of a PostgreSQL that a
+/// server has (its lease) nothing is changed: what would change it is a conflict that names the server, what
+/// reads it says so.
 namespace anchord {
 
-/// Returns the version. Errors: those of open_database() and open_postgres().
+/// Returns the version. Errors: those of open_database() and open_postgres(); conflict: a server has it.
 Result<int> migrate_database(const std::string& place);
 
-/// Of every table; of a database of an older version too, which is migrated first.
-Result<std::vector<sql::TableDigest>> digest_database(const std::string& place);
+/// Called with a database that is only read, and the server that writes into it meanwhile.
+using ServedNotice = std::function<void(const std::string& shown, const std::string& server)>;
+
+/// Of every table, at one moment; of a database of an older version too, which is migrated first unless a
+/// server has it (conflict).
+Result<std::vector<sql::TableDigest>> digest_database(const std::string& place,
+                                                      const ServedNotice& served = {});
 
 /// Called after each table or some thousand rows; false ends the copy, which can be gone on with.
 using CopyProgress = std::function<bool(const std::string& table, std::uint64_t rows)>;
@@ -37,9 +43,10 @@ struct CopyReport {
 /// goes on where it was; until it is whole, no server takes the database. The files of impulse responses that
 /// the rows need are copied before them, and each is compared by its SHA-256. What else is no row (keys,
 /// recordings) stays in its folder. Errors: conflict (`to` has rows; they differ in the end; another process
-/// has the folder), not_found (files of impulse responses are missing), canceled, those of the databases.
+/// has the folder, or a server has `to`), not_found (files of impulse responses are missing), canceled, those
+/// of the databases.
 Result<CopyReport> copy_database(const std::string& from, const std::string& to, const CopyFolders& folders,
-                                 const CopyProgress& progress);
+                                 const CopyProgress& progress, const ServedNotice& served = {});
 
 namespace sql {
 /// unsupported where a copy into this database has not come to its end. `exists` tells whether its table is

@@ -32,6 +32,9 @@ constexpr const char* k_take_lease =
 constexpr const char* k_stand_by_lease =
     "UPDATE server_lease SET standby = ?1, standby_t_ns = now_ns() WHERE one = 1 RETURNING server";
 constexpr const char* k_lease_holder = "SELECT server FROM server_lease";
+constexpr const char* k_any_lease = "SELECT count(*) FROM pg_class WHERE oid = to_regclass('server_lease')";
+constexpr const char* k_live_holder =
+    "SELECT server FROM server_lease WHERE one = 1 AND lease_t_ns > now_ns()";
 constexpr const char* k_renew_lease =
     "UPDATE server_lease SET lease_t_ns = now_ns() + ?2 WHERE one = 1 AND fence = ?1 RETURNING "
     "standby_t_ns > now_ns() - ?3";
@@ -239,6 +242,16 @@ void ServerLease::give_back() {
   } catch (const SqlError&) {
     // It ends by itself.
   }
+}
+
+std::optional<std::string> sql::serving_server(PostgresConnection& connection) {
+  {
+    Query any(connection, k_any_lease);
+    if (!any.step() || any.integer() == 0) return std::nullopt;
+  }
+  Query holder(connection, k_live_holder);
+  if (!holder.step()) return std::nullopt;
+  return holder.text();
 }
 
 }  // namespace anchord

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -79,5 +80,12 @@ class ServerLease {
   std::condition_variable wake_;
   Thread keeper_, watch_;
 };
+
+namespace sql {
+class PostgresConnection;
+/// The server that has this database now, as its lease says it: its name, and where it is reached. Nothing
+/// where none has it, also where the database is none of anchord or of before there were leases.
+std::optional<std::string> serving_server(PostgresConnection& connection);
+}  // namespace sql
 
 }  // namespace anchord

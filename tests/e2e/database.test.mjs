@@ -138,6 +138,51 @@ test('a copy into rows, from nothing, or of a folder in use is refused, and chan
   );
 });
 
+test('of a database that a server has nothing is changed, and what reads it says that the server writes', async () => {
+  const there = await address('served'),
+    served = join(folder, 'served');
+  assert.equal((await database('copy', flown, there)).code, 0);
+  const server = await startServer({ dataDir: served, args: ['--database', there], env: postgres.env });
+  const rows = () =>
+    postgres.psql('SELECT (SELECT count(*) FROM mission), (SELECT max(number) FROM schema_migration)', 'served');
+  const before = await rows();
+  for (const words of [
+    ['copy', join(folder, 'back'), there],
+    ['migrate', there],
+  ]) {
+    const refused = await database(...words);
+    assert.equal(refused.code, 1, words[0] + refused.stdout);
+    assert.match(refused.stderr, /server \S+.* has postgresql:.*\/served: stop it first/);
+  }
+  const says = /server \S+.* has postgresql:.*\/served and writes into it/;
+  const checked = await database('check', there, flown);
+  assert.match(checked.stderr, says);
+  assert.match(checked.stdout, /tables, \d+ differ/);
+  const away = join(folder, 'away');
+  const copied = await database('copy', there, away);
+  assert.equal(copied.code, 0, copied.stderr);
+  assert.match(copied.stderr, says);
+  assert.equal(await rows(), before);
+  // Nor is it brought to a version that the server does not know.
+  const newest = 'number = (SELECT max(number) FROM schema_migration)';
+  await postgres.psql(`CREATE TABLE kept AS SELECT * FROM schema_migration WHERE ${newest}`, 'served');
+  await postgres.psql(`DELETE FROM schema_migration WHERE ${newest}`, 'served');
+  const older = await rows();
+  const other = await database('check', there);
+  assert.equal(other.code, 1, other.stdout);
+  assert.match(other.stderr, /has postgresql:.*\/served at version \d+, not \d+: stop it first/);
+  assert.equal(await rows(), older);
+  assert.equal((await server.fetch('/api/v1/missions')).status, 200);
+  // One that was killed has it until its lease ends.
+  await server.kill();
+  assert.equal((await database('migrate', there)).code, 1);
+  await postgres.psql('INSERT INTO schema_migration SELECT * FROM kept; DROP TABLE kept', 'served');
+  await eventually('its lease is over', async () => (await database('migrate', there)).code === 0, 20_000, 200);
+  const alone = await database('check', there);
+  assert.deepEqual([alone.code, alone.stderr], [0, '']);
+  await server.dispose();
+});
+
 test('impulse responses in files go along with a backup and with a copy, and are never missing in silence', async () => {
   const files = (dir) => readdirSync(join(dir, 'cir-archive')).filter((name) => name.endsWith('.db'));
   const digest = async (server) => {
