@@ -24,7 +24,13 @@ Result<CsvTable> CsvTable::open(const std::filesystem::path& folder, const std::
   const auto& file = has_plain ? plain : packed;
   BOOST_OUTCOME_TRY(auto lines, api::GzipLines::open(file));
   CsvTable table(file.string(), std::move(lines));
-  BOOST_OUTCOME_TRY(const bool any, table.read_record());
+  BOOST_OUTCOME_TRY(bool any, table.read_record());
+  // The line by which Excel is told the separator.
+  if (any && table.record_.cells().size() <= 2 && table.record_.cells().front().starts_with("sep=")) {
+    if (const auto cell = table.record_.cells().front(); cell.size() == 5)
+      table.record_ = api::CsvRecord({cell[4], true});
+    BOOST_OUTCOME_TRY(any, table.read_record());
+  }
   if (!any) return make_error(Errc::invalid_argument, table.file_ + ": empty, expected a header line");
   for (const auto name : table.record_.cells()) {
     if (std::ranges::find(table.header_, name) != table.header_.end()) {

@@ -3,8 +3,12 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <set>
+#include <utility>
 
+#include "api/formats/foreign_axes.hpp"
 #include "api/formats/foreign_meaning.hpp"
+#include "api/formats/foreign_values.hpp"
 #include "api/formats/globe_track.hpp"
 
 namespace anchord::api {
@@ -34,6 +38,96 @@ ForeignColumns guessed(const ForeignTable& table, const std::array<const char*, 
     }
   }
   return out;
+}
+
+/// Behind the last "_" of a plain name, and before it.
+struct Parts {
+  std::string before, last;
+  const std::string* column;
+};
+std::vector<Parts> parts_of(const ForeignTable& table) {
+  std::vector<Parts> out;
+  for (const auto& column : table.columns()) {
+    std::string name = plain_name(column);
+    if (name.ends_with("_m")) name.resize(name.size() - 2);
+    const auto at = name.rfind('_');
+    if (at != std::string::npos) out.push_back({name.substr(0, at), name.substr(at + 1), &column});
+  }
+  return out;
+}
+
+bool is_one_of(std::string_view words, const std::string& word) {
+  return !word.empty() && contains(words, ' ' + word + ' ');
+}
+
+/// Columns of one message that have one name before their own (pose.position.x of ROS): those of the only
+/// name, among the ones that `accepted` takes, that has a column for each field. `words`: for each field its
+/// last parts.
+template <std::size_t N, class Accepted>
+std::optional<std::array<std::string, N>> of_one_message(const std::vector<Parts>& parts,
+                                                         const std::array<const char*, N>& words,
+                                                         const Accepted& accepted) {
+  std::optional<std::array<std::string, N>> out;
+  std::set<std::string> names;
+  for (const auto& part : parts) names.insert(part.before);
+  for (const auto& name : names) {
+    if (!accepted(name)) continue;
+    std::array<std::string, N> columns;
+    bool complete = true;
+    for (std::size_t i = 0; i < N; ++i) {
+      std::size_t n = 0;
+      for (const auto& part : parts) {
+        if (part.before != name || !is_one_of(words[i], part.last)) continue;
+        columns[i] = *part.column;
+        ++n;
+      }
+      complete = complete && n == 1;
+    }
+    if (!complete) continue;
+    if (out) return std::nullopt;
+    out = columns;
+  }
+  return out;
+}
+
+std::string last_word(const std::string& name) { return name.substr(name.rfind('_') + 1); }
+
+/// A field whose name is the last part of one column alone.
+void add_by_ending(const std::vector<Parts>& parts, const char* field, std::string_view words,
+                   ForeignColumns& out) {
+  const std::string* found = nullptr;
+  for (const auto& part : parts) {
+    if (!is_one_of(words, part.last)) continue;
+    if (found != nullptr) return;
+    found = part.column;
+  }
+  if (found != nullptr) out.try_emplace(field, *found);
+}
+
+/// Places and attitudes whose columns are called by the messages that they were in.
+void add_place_by_endings(const ForeignTable& table, ForeignColumns& out) {
+  const auto parts = parts_of(table);
+  if (!out.contains("time")) add_by_ending(parts, "time", " time timestamp timeus ", out);
+  const auto has = [&](std::initializer_list<const char*> fields) {
+    return std::ranges::all_of(fields, [&](const char* f) { return out.contains(f); });
+  };
+  if (has({"lat", "lon"}) || has({"x", "y"})) return;
+  if (const auto globe =
+          of_one_message<3>(parts, {" lat latitude ", " lon lng longitude ", " alt altitude height "},
+                            [](const auto&) { return true; })) {
+    for (std::size_t i = 0; i < 3; ++i) out[std::array{"lat", "lon", "height"}[i]] = (*globe)[i];
+    return;
+  }
+  const auto place = of_one_message<3>(parts, {" x ", " y ", " z "}, [](const std::string& name) {
+    return is_one_of(" position pos translation pose point location stateestimate ned ", last_word(name));
+  });
+  if (!place) return;
+  for (std::size_t i = 0; i < 3; ++i) out[std::array{"x", "y", "z"}[i]] = (*place)[i];
+  const auto turn = of_one_message<4>(parts, {" x ", " y ", " z ", " w "}, [](const std::string& name) {
+    return is_one_of(" orientation rotation quaternion ", last_word(name));
+  });
+  for (std::size_t i = 0; turn && i < 4; ++i)
+    out.try_emplace(std::array{"qx", "qy", "qz", "qw"}[i], (*turn)[i]);
 }
 
 std::string_view name_at(const ForeignColumns& columns, std::string_view field) {
@@ -103,6 +197,11 @@ ForeignColumns guessed_track_columns(const ForeignTable& table) {
     auto node = out.extract(field);
     return node.empty() ? std::optional<std::string>() : std::optional(std::move(node.mapped()));
   };
+  add_place_by_endings(table, out);
+  // North, east and down by their first letters.
+  if (!out.contains("z") && !out.contains("height") && is_east(name_at(out, "x")))
+    for (const auto& column : table.columns())
+      if (const auto name = plain_name(column); name == "d" || name == "d_m") out["z"] = column;
   const bool globe = out.contains("lat") && out.contains("lon");
   for (const char* axis : {"lat", "lon"})
     if (const auto letters = hemisphere_column(table, out, axis))
@@ -125,7 +224,15 @@ ForeignColumns guessed_track_columns(const ForeignTable& table) {
   }
   return out;
 }
-ForeignColumns guessed_range_columns(const ForeignTable& table) { return guessed(table, k_range_fields); }
+ForeignColumns guessed_range_columns(const ForeignTable& table) {
+  ForeignColumns out = guessed(table, k_range_fields);
+  const auto parts = parts_of(table);
+  for (const auto& [field, words] :
+       {std::pair{"time", " time timestamp timeus "}, std::pair{"anchor", " anchor "},
+        std::pair{"range", " range distance "}, std::pair{"tag", " tag "}})
+    if (!out.contains(field)) add_by_ending(parts, field, words, out);
+  return out;
+}
 
 std::vector<std::string> missing_track_fields(const ForeignColumns& columns) {
   auto out = without_column(columns, {"time"});

@@ -21,7 +21,7 @@ inline constexpr std::array k_foreign_fields{
     FieldNames{"time",
                "t_s t_us t_ms t_ns time time_s time_ms time_us time_ns time_utc time_utc_usec "
                "timestamp timestamp_s timestamp_ms timestamp_us timestamp_ns t utc gpst gps_time unix "
-               "datetime date_time zeit"},
+               "datetime date_time zeit time_unix_usec time_usec timeus timems time_boot_ms t_utc"},
     FieldNames{"zone", "tz timezone time_zone utc_offset tz_offset gmt_offset zeitzone"},
     FieldNames{"lat", "lat_deg lat latitude latitude_deg breite"},
     FieldNames{"lon", "lon_deg lon lng longitude longitude_deg laenge"},
@@ -44,11 +44,13 @@ inline constexpr std::array k_foreign_fields{
                "undulation_m geoid_height geoid_height_m geoid_undulation"},
     FieldNames{"x",
                "x_m x e_m east east_m easting easting_m e rechtswert ostwert x_ecef_m ecef_x ecef_x_m "
-               "e_baseline_m"},
+               "e_baseline_m pe pe_m pos_e pos_e_m x_ned ned_x pos_ned_x pos_ned_0"},
     FieldNames{"y",
                "y_m y n_m north north_m northing northing_m n hochwert nordwert y_ecef_m ecef_y "
-               "ecef_y_m n_baseline_m"},
-    FieldNames{"z", "z_m z u_m up up_m z_ecef_m ecef_z ecef_z_m u_baseline_m"},
+               "ecef_y_m n_baseline_m pn pn_m pos_n pos_n_m y_ned ned_y pos_ned_y pos_ned_1"},
+    FieldNames{"z",
+               "z_m z u_m up up_m z_ecef_m ecef_z ecef_z_m u_baseline_m pd pd_m pos_d pos_d_m down down_m "
+               "z_ned ned_z pos_ned_z pos_ned_2"},
     FieldNames{"fix", "fix fix_type quality fix_quality gps_qual rtk q carrsoln status"},
     FieldNames{"sigma_h", "sd_h_m sigma_h_m hacc h_acc sd_h"},
     FieldNames{"sigma_v", "sd_v_m sigma_v_m vacc v_acc sd_v sdu_m sigma_u_m"},

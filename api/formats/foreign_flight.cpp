@@ -7,6 +7,8 @@
 #include <set>
 #include <utility>
 
+#include "api/formats/foreign_reading.hpp"
+#include "api/formats/foreign_tags.hpp"
 #include "api/formats/foreign_values.hpp"
 #include "api/formats/globe_track.hpp"
 #include "api/wire/row_limits.hpp"
@@ -14,202 +16,6 @@
 
 namespace anchord::api {
 namespace {
-
-constexpr std::string_view k_needs_time_of_ranges = "time of the ranges", k_needs_tag = "tag address",
-                           k_needs_fix = "fix numbers", k_needs_degrees = "degrees", k_needs_crs = "crs",
-                           k_needs_heights = "heights", k_needs_heading = "heading",
-                           k_needs_addresses = "addresses";
-
-std::string_view column_of(const ForeignColumns& columns, std::string_view field) {
-  const auto at = columns.find(field);
-  return at == columns.end() ? std::string_view() : std::string_view(at->second);
-}
-
-/// Those known by name, with what a person says in their place.
-ForeignColumns merged(ForeignColumns guessed, const ForeignColumns& said) {
-  // Whoever names a column of one kind of place means no other.
-  const auto says = [&](std::initializer_list<const char*> fields) {
-    return std::ranges::any_of(fields, [&](const char* f) { return said.contains(f); });
-  };
-  if (says({"lat", "lon", "height"}) && !says({"x", "y", "z"}))
-    for (const char* f : {"x", "y", "z"}) guessed.erase(f);
-  if (says({"x", "y", "z"}) && !says({"lat", "lon", "height"}))
-    for (const char* f : {"lat", "lon", "height"}) guessed.erase(f);
-  for (const auto& [field, column] : said) {
-    if (column.empty())
-      guessed.erase(field);
-    else
-      guessed[field] = column;
-  }
-  return guessed;
-}
-
-/// How the values are written.
-struct Reading {
-  ForeignColumns tc, rc;
-  PlaceKind kind{};
-  bool local{};  ///< x, y, z
-  TimeReading track_time, range_time;
-  double range_per_metre{1}, height_per_metre{1};
-  std::optional<FixNumbers> fix;
-  std::optional<HeadingKind> heading;
-  std::optional<AddressKind> addresses;
-  std::optional<std::string> crs, heights;
-  bool heights_matter{};
-  std::string wrong_unit;  ///< what a column of units says that is not read
-};
-
-/// Lengths whose unit stands in a column of its own; those that an option gives are not looked at.
-void read_units(const ForeignTable& track, const ForeignTable& ranges, const ForeignOptions& o, Reading& r) {
-  const auto look = [&](const ForeignTable& table, const ForeignColumns& columns, const char* field,
-                        double* per_metre_out) {
-    const auto beside = unit_column(table, columns, field);
-    if (!beside) return;
-    if (per_metre_out != nullptr && beside->unit) {
-      *per_metre_out = per_metre(*beside->unit);
-    } else if (beside->unit != LengthUnit::m && r.wrong_unit.empty()) {
-      r.wrong_unit = table.name() + ": the column '" + beside->name + "' says that '" +
-                     std::string(column_of(columns, field)) + "' is in " + beside->word +
-                     ": write it in metres" +
-                     (per_metre_out != nullptr ? ", centimetres or millimetres" : "");
-    }
-  };
-  if (!o.range_unit) look(ranges, r.rc, "range", &r.range_per_metre);
-  if (!o.height_unit) look(track, r.tc, r.local ? "z" : "height", &r.height_per_metre);
-  for (const char* field : {"separation", "x", "y"}) look(track, r.tc, field, nullptr);
-}
-
-std::optional<HeadingKind> heading_of(const ForeignTable& track, const ForeignColumns& tc) {
-  if (!tc.contains("heading")) return HeadingKind::deg;
-  for (const char* part : {"qx", "qy", "qz", "qw"})
-    if (!tc.contains(part)) return heading_kind(track, column_of(tc, "heading"));
-  return HeadingKind::deg;  // attitudes come before a heading
-}
-
-/// Nothing where nothing says it, and where it is sea level by a geoid that nothing names.
-std::optional<std::string> heights_by_name(const ForeignTable& track, const Reading& reading) {
-  const std::string name = plain_name(column_of(reading.tc, reading.local ? "z" : "height"));
-  if (contains(name, "msl") || contains(name, "orthometric") || contains(name, "sea_level") ||
-      contains(name, "nhn"))
-    return reading.tc.contains("separation") ? std::optional<std::string>("column") : std::nullopt;
-  for (std::string_view rest = name; !rest.empty();) {
-    const auto word = rest.substr(0, rest.find('_'));
-    if (word == "ell" || word == "hae" || word.starts_with("ellips")) return "ellipsoidal";
-    rest.remove_prefix(std::min(rest.size(), word.size() + 1));
-  }
-  return name == "h_m" || track.ellipsoidal() ? std::optional<std::string>("ellipsoidal") : std::nullopt;
-}
-
-Reading reading_of(const ForeignTable& track, const ForeignTable& ranges, const ForeignOptions& o) {
-  Reading r;
-  r.tc = merged(guessed_track_columns(track), o.track_columns);
-  r.rc = merged(guessed_range_columns(ranges), o.range_columns);
-  r.local = is_local(r.tc);
-  r.kind = place_kind(track, r.tc);
-  r.track_time = time_reading(track, column_of(r.tc, "time"));
-  r.range_time = time_reading(ranges, column_of(r.rc, "time"));
-  r.track_time = {o.track_time_unit.value_or(r.track_time.unit),
-                  o.track_time_scale.value_or(r.track_time.scale)};
-  r.range_time = {o.range_time_unit.value_or(r.range_time.unit),
-                  o.range_time_scale.value_or(r.range_time.scale)};
-  r.range_per_metre = per_metre(o.range_unit.value_or(range_unit(ranges, column_of(r.rc, "range"))));
-  r.fix = o.fix_numbers;
-  if (!r.tc.contains("fix"))
-    r.fix = FixNumbers::words;
-  else if (!r.fix)
-    r.fix = fix_numbers(track, column_of(r.tc, "fix"));
-  r.heading = o.heading ? o.heading : heading_of(track, r.tc);
-  r.addresses = o.addresses;
-  if (!r.addresses && !may_be_hexadecimal(ranges, column_of(r.rc, "anchor")) &&
-      !may_be_hexadecimal(ranges, column_of(r.rc, "tag"), o.tag))
-    r.addresses = AddressKind::as_written;
-  r.crs = o.crs;
-  if (!r.crs && r.kind != PlaceKind::map) r.crs = r.kind == PlaceKind::ecef ? "ECEF" : "";
-  r.heights = o.heights ? o.heights : heights_by_name(track, r);
-  const auto height = column_of(r.tc, r.local ? "z" : "height");
-  const auto values = track.sample_numbers(height);
-  // Who writes whole numbers of 1e-7 degrees writes whole millimetres.
-  const bool whole_mm = r.kind == PlaceKind::degrees_1e7 &&
-                        std::ranges::all_of(values, [](double v) { return v == std::trunc(v); });
-  const auto by_name = unit_of_name(height);
-  r.height_per_metre =
-      per_metre(o.height_unit.value_or(by_name.value_or(whole_mm ? LengthUnit::mm : LengthUnit::m)));
-  read_units(track, ranges, o, r);
-  const bool ecef = r.crs && plain_name(*r.crs) == "ecef";
-  r.heights_matter = !r.local || (!(r.crs && r.crs->empty()) && !ecef);
-  return r;
-}
-
-Needs needs_of(const Reading& r, const std::string& tag) {
-  Needs out = missing_track_fields(r.tc);
-  for (const auto& field : missing_range_fields(r.rc))
-    out.push_back(field == "time" ? std::string(k_needs_time_of_ranges) : field);
-  if (!r.rc.contains("tag") && tag.empty()) out.emplace_back(k_needs_tag);
-  if (!r.fix) out.emplace_back(k_needs_fix);
-  if (!r.heading) out.emplace_back(k_needs_heading);
-  if (!r.addresses) out.emplace_back(k_needs_addresses);
-  if (r.kind == PlaceKind::no_degrees) out.emplace_back(k_needs_degrees);
-  if (!r.crs) out.emplace_back(k_needs_crs);
-  if (r.heights_matter && !r.heights) out.emplace_back(k_needs_heights);
-  return out;
-}
-
-std::string listed(const std::vector<std::string>& names) {
-  std::string out;
-  for (const auto& name : names) out += (out.empty() ? "" : ", ") + name;
-  return out;
-}
-
-/// What is not known, and which option says it.
-std::string words_of(const std::string& need, const ForeignTable& track, const ForeignTable& ranges,
-                     const Reading& r) {
-  const std::string column_option = " (have: " + listed(track.columns()) + "): --column track.";
-  if (need == k_needs_tag) return "no column has the tag: give --tag 0x6e01, or --column ranges.tag=NAME";
-  if (need == k_needs_fix)
-    return track.name() + ": 1 and 2 in '" + std::string(column_of(r.tc, "fix")) +
-           "' have different meanings in different programs: give --fix-numbers solution, nmea, rtklib or "
-           "mavlink";
-  if (need == k_needs_heading)
-    return track.name() + ": '" + std::string(column_of(r.tc, "heading")) +
-           "' has no unit, and no value beyond two pi: give --heading deg or rad (clockwise from true "
-           "north), "
-           "deg_ccw_from_east or rad_ccw_from_east (ROS)";
-  if (need == k_needs_addresses)
-    return ranges.name() +
-           ": addresses look like hexadecimal numbers without 0x, 1021 beside 9E04: give --addresses hex, or "
-           "names where they are names and decimal numbers";
-  if (need == k_needs_degrees)
-    return track.name() +
-           ": the columns of latitude and longitude are not in decimal degrees (degrees and minutes, or one "
-           "for the other?): write decimal degrees, exchange them with --column track.lat=NAME and "
-           "track.lon, "
-           "or give --column track.x=NAME, track.y, track.z and --crs EPSG:CODE of a map";
-  if (need == k_needs_crs)
-    return track.name() + ": x, y, z are " + k_of_a_map + ": --crs EPSG:25832, UTM 32N or ECEF";
-  if (need == k_needs_heights)
-    return track.name() + ": it is not stated what the heights in '" +
-           std::string(column_of(r.tc, r.local ? "z" : "height")) +
-           "' are above: --heights ellipsoidal, EPSG:5773 (mean sea level, EGM96), metres of the geoid "
-           "there, or "
-           "column with --column track.separation=NAME";
-  if (need == k_needs_time_of_ranges || need == "anchor" || need == "range") {
-    const std::string field = need == k_needs_time_of_ranges ? "time" : need;
-    return ranges.name() + ": no column was found for the " + field + " (have: " + listed(ranges.columns()) +
-           "): --column ranges." + field + "=NAME" + (need == "range" ? ", or --column-for-each-anchor" : "");
-  }
-  return track.name() + ": no column was found for " + need + column_option + need + "=NAME";
-}
-
-Result<void> check_columns(const ForeignTable& table, const ForeignColumns& columns, const char* of) {
-  for (const auto& [field, column] : columns) {
-    if (std::ranges::find(k_foreign_fields, field, &FieldNames::field) == k_foreign_fields.end())
-      return make_error(Errc::invalid_argument, std::string(of) + '.' + field + ": there is no such field");
-    if (!column.empty() && !table.column(column))
-      return make_error(Errc::invalid_argument, table.name() + ": there is no column '" + column +
-                                                    "' (have: " + listed(table.columns()) + ')');
-  }
-  return boost::outcome_v2::success();
-}
 
 /// Cells of a table by field.
 class Cells {
@@ -287,7 +93,9 @@ class TrackReader {
     const auto geoid = separation_ ? separation_->number(row) : std::optional(0.0);
     if (!x || !y || !z || !geoid) return std::nullopt;
     const double per_degree = reading_.kind == PlaceKind::degrees_1e7 ? 1e7 : 1;
-    return Eigen::Vector3d(*x / per_degree, *y / per_degree, *z / reading_.height_per_metre + *geoid);
+    const Eigen::Vector3d at(*x / per_degree, *y / per_degree, *z / reading_.height_per_metre);
+    const Eigen::Vector3d up = reading_.local ? enu_of(at, *reading_.axes, named_east_) : at;
+    return Eigen::Vector3d(up.x(), up.y(), up.z() + *geoid);
   }
   /// By the letter of its hemisphere; nothing where it has none, or a sign that says the other one.
   static std::optional<double> with_sign(std::optional<double> value, std::size_t row,
@@ -334,9 +142,10 @@ class TrackReader {
   }
   void add_attitude(std::size_t row, Fix& fix) const {
     const auto x = qx_.number(row), y = qy_.number(row), z = qz_.number(row), w = qw_.number(row);
-    if (x && y && z && w)
-      fix.enu_from_body = row_limits::rotation_of({*x, *y, *z, *w});
-    else if (const auto to = heading_.number(row))
+    if (x && y && z && w) {
+      const auto attitude = row_limits::rotation_of({*x, *y, *z, *w});
+      if (attitude) fix.enu_from_body = enu_attitude(*attitude, *reading_.axes);
+    } else if (const auto to = heading_.number(row))
       fix.enu_from_body = row_limits::rotation_of_heading(north_deg(*to, *reading_.heading));
   }
 
@@ -345,6 +154,7 @@ class TrackReader {
   std::int64_t epoch_us_;
   Cells cells_;
   bool own_frame_{};
+  bool named_east_ = is_east(column_of(reading_.tc, "x"));
   std::optional<Cells::At> separation_;
   Cells::At time_ = cells_("time"), zone_ = cells_("zone"),
             north_ = cells_(reading_.local ? "" : "lat_hemisphere"),
@@ -357,22 +167,32 @@ class TrackReader {
 };
 
 Result<void> read_ranges(const ForeignTable& table, const Reading& reading, const ForeignOptions& o,
-                         ForeignFlight& out) {
+                         const TagArms& arms, ForeignFlight& out) {
   const Cells cells(table, reading.rc);
   const auto time = cells("time"), zone = cells("zone"), distance = cells("range"), anchor = cells("anchor"),
              tag = cells("tag"), kind = cells("kind"), rss = cells("rss"), rx = cells("rx"), fp = cells("fp"),
              seq = cells("seq"), antenna = cells("antenna");
   std::map<NetworkId, std::string> names;  // of anchors that have a name alone
+  std::size_t n_turned = 0;
+  const auto is_tag = [&](const std::string& text) {
+    return !arms.empty() && arms.contains(foreign_id(text, *reading.addresses).id);
+  };
   for (std::size_t row = 0; row < table.n_rows(); ++row) {
     const auto moment = time_text(row, time, zone, reading.range_time);
     const auto us = time_us(table, moment, reading.range_time, o.epoch_us);
     const auto metres = distance.number(row);
-    const std::string who(anchor.text(row)), of(tag.text(row).empty() ? o.tag : tag.text(row));
-    const std::string wrong = of.empty()    ? "no tag"
-                              : who.empty() ? "no anchor"
-                              : !us         ? no_time(moment)
-                              : !metres     ? "no range"
-                                            : "";
+    std::string who(anchor.text(row)), of(tag.text(row).empty() ? o.tag : tag.text(row));
+    const bool to_tag = is_tag(who);
+    if (to_tag && !is_tag(of)) {
+      std::swap(who, of);
+      ++n_turned;
+    }
+    const std::string wrong = to_tag && is_tag(who) ? "a range between two tags"
+                              : of.empty()          ? "no tag"
+                              : who.empty()         ? "no anchor"
+                              : !us                 ? no_time(moment)
+                              : !metres             ? "no range"
+                                                    : "";
     if (!wrong.empty()) {
       out.refused.push_back(row_text(table, row, wrong));
       continue;
@@ -400,6 +220,9 @@ Result<void> read_ranges(const ForeignTable& table, const Reading& reading, cons
     range.fp_dbm = fp.number(row);
     out.data.ranges.push_back(std::move(range));
   }
+  if (n_turned > 0)
+    out.data.notes.push_back(table.name() + ": " + std::to_string(n_turned) +
+                             " ranges were begun by the anchor: tag and anchor are exchanged in them");
   return boost::outcome_v2::success();
 }
 
@@ -417,7 +240,7 @@ void keep_once(std::vector<Fix>& fixes) {
   fixes = std::move(once);
 }
 
-Mission mission_of(const ForeignOptions& o, const std::vector<Range>& ranges) {
+Mission mission_of(const ForeignOptions& o, const TagArms& arms, const std::vector<Range>& ranges) {
   Mission mission;
   mission.name = o.name.empty() ? "Imported flight" : o.name;
   mission.kit = o.kit;
@@ -427,7 +250,8 @@ Mission mission_of(const ForeignOptions& o, const std::vector<Range>& ranges) {
   std::set<std::pair<NetworkId, std::uint8_t>> seen;
   for (const auto& range : ranges) {
     if (range.kind == RangeKind::tag_anchor && seen.emplace(range.tag, range.antenna).second)
-      mission.tags.push_back({range.tag, range.antenna, o.lever_arm_body_m});
+      mission.tags.push_back(
+          {range.tag, range.antenna, arms.contains(range.tag) ? arms.at(range.tag) : o.lever_arm_body_m});
   }
   if (!ranges.empty()) mission.created = ranges.front().time;
   return mission;
@@ -475,6 +299,12 @@ void add_notes(const ForeignTable& track, const ForeignTable& ranges, const Read
     note_unused(track, {&r.tc}, {"height", "z"}, notes);
     note_unused(ranges, {&r.rc}, {"range"}, notes);
   }
+  if (r.axes == TrackAxes::ned)
+    notes.push_back(
+        track.name() + ": '" + std::string(column_of(r.tc, "z")) + "' counts downwards" +
+        (is_east(column_of(r.tc, "x")) ? "" : ", x is north and y east") +
+        ": the track is changed to east, north, up, and so are the anchors; --track-axes enu if z "
+        "counts upwards");
   if (!r.tc.contains("fix"))
     notes.push_back(track.name() + ": no column is the fix class, every position is used as RTK fixed");
   if (r.fix == FixNumbers::gnss)
@@ -496,7 +326,8 @@ void add_notes(const ForeignTable& track, const ForeignTable& ranges, const Read
                     " ranges are outside the time of the track, " + to_rfc3339(first->time) + " to " +
                     to_rfc3339(last->time) + "; the first range is at " +
                     to_rfc3339(out.data.ranges.front().time) +
-                    ": if they are 18 s apart, one of them is in GPS time");
+                    ": if they are 18 s apart, one of them is in GPS time; --track-time and --range-time say "
+                    "unit and clock (s, ms, us, ns; utc, gps), --column track.time=NAME another column");
 }
 
 }  // namespace
@@ -513,14 +344,17 @@ Result<ForeignFlight> foreign_flight(const ForeignTable& track, const ForeignTab
   std::string unknown;
   for (const auto& need : needs_of(reading, options.tag))
     unknown += (unknown.empty() ? "" : "\n") + words_of(need, track, ranges, reading);
-  if (!reading.wrong_unit.empty()) unknown += (unknown.empty() ? "" : "\n") + reading.wrong_unit;
+  if (!reading.contradiction.empty()) unknown += (unknown.empty() ? "" : "\n") + reading.contradiction;
   if (!unknown.empty()) return make_error(Errc::invalid_argument, unknown);
   ForeignFlight out;
   BOOST_OUTCOME_TRY(out.source, source_of(reading, options.max_datum_error_m));
   TrackReader(track, reading, options.epoch_us).read(out);
-  BOOST_OUTCOME_TRYV(read_ranges(ranges, reading, options, out));
+  BOOST_OUTCOME_TRY(const auto arms, arms_of(options, *reading.addresses));
+  BOOST_OUTCOME_TRYV(read_ranges(ranges, reading, options, arms, out));
+  BOOST_OUTCOME_TRYV(check_arms(arms, options, out.data.ranges));
+  note_tags(ranges.name(), arms, out.data.ranges, out.data.notes);
   if (&track == &ranges) keep_once(out.data.fixes);
-  out.data.mission = mission_of(options, out.data.ranges);
+  out.data.mission = mission_of(options, arms, out.data.ranges);
   out.data.mission.frame = TrackFrame::local;
   if (!reading.local && !out.source) {
     out.data.mission.frame = TrackFrame::wgs84;

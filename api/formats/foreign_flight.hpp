@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "api/formats/foreign_axes.hpp"
 #include "api/formats/foreign_columns.hpp"
 #include "api/formats/foreign_meaning.hpp"
 #include "api/formats/foreign_values.hpp"
@@ -24,6 +25,7 @@ struct ForeignOptions {
   std::optional<FixNumbers> fix_numbers{};
   std::optional<HeadingKind> heading{};
   std::optional<AddressKind> addresses{};
+  std::optional<TrackAxes> axes{};
   std::optional<std::string> crs{};  ///< of x, y, z, as SourceCrsSpec has it; empty: a local frame
   /// "ellipsoidal", "column" (another column has the height of the geoid), or as read_heights() takes it
   std::optional<std::string> heights{};
@@ -32,6 +34,7 @@ struct ForeignOptions {
   std::int64_t epoch_us{0};  ///< of t = 0, where times are seconds of the flight
   TrackPoint point{TrackPoint::gnss_antenna};
   Eigen::Vector3d lever_arm_body_m{0, 0, 0};
+  std::map<std::string, Eigen::Vector3d> lever_arms_body_m{};  ///< of tags, which come before the one of all
   std::optional<double> lever_arm_sigma_m{};
   std::string tag{};  ///< where no column says it
 };

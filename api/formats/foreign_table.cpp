@@ -9,6 +9,7 @@
 #include <limits>
 
 #include "api/formats/csv_record.hpp"
+#include "api/formats/foreign_text.hpp"
 #include "api/formats/text_decoding.hpp"
 #include "core/base/text.hpp"
 
@@ -121,6 +122,7 @@ Result<ForeignTable> ForeignTable::parse(std::string name, std::string_view byte
   ForeignTable table;
   table.name_ = std::move(name);
   table.text_ = std::make_unique<std::string>(decoded(bytes));
+  if (const auto why = no_table(*table.text_); !why.empty()) return table.error(": " + why);
   BOOST_OUTCOME_TRYV(table.text_->starts_with('%') ? table.take_rtklib() : table.take_separated());
   if (table.cells_.empty()) return table.error(": a header line and at least one row are needed");
   const auto is_number = [&](const std::string& c) { return std::isfinite(table.number(c)); };
@@ -166,7 +168,8 @@ Result<void> ForeignTable::take_rtklib() {
 
 Result<void> ForeignTable::take_separated() {
   std::string_view text = *text_;
-  const char separator = separator_of(text);
+  const char said = take_separator_line(text);
+  const char separator = said != '\0' ? said : separator_of(text);
   CsvRecord record({separator, true});
   const auto next = [&]() -> Result<bool> {
     auto more = next_record(record, text);

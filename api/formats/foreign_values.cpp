@@ -137,6 +137,70 @@ std::optional<std::int64_t> week_us(std::string_view cell) {
   return static_cast<std::int64_t>(us) - leap_us(us);
 }
 
+/// Moments of a column, each once, in order.
+std::vector<double> times_of(const ForeignTable& table, std::string_view column) {
+  std::vector<double> out;
+  const auto at = table.column(column);
+  for (std::size_t row = 0; at && row < table.n_rows(); ++row)
+    if (const double value = table.number(table.cell(row, *at)); std::isfinite(value)) out.push_back(value);
+  std::ranges::sort(out);
+  out.erase(std::unique(out.begin(), out.end()), out.end());
+  return out;
+}
+
+struct UnitLength {
+  TimeUnit unit;
+  double s;
+};
+constexpr std::array k_unit_lengths{UnitLength{TimeUnit::s, 1}, UnitLength{TimeUnit::ms, 1e-3},
+                                    UnitLength{TimeUnit::us, 1e-6}, UnitLength{TimeUnit::ns, 1e-9}};
+/// 2 kHz to 0.2 Hz; of moments that a calendar shows, gaps do no harm.
+constexpr double k_shortest_s = 1 / 2000.0, k_longest_s = 5, k_longest_of_date_s = 499;
+/// Of numbers since 1970: 1999 to 2103. Of those since a machine was switched on: at most ten days of work,
+/// and a flight of at least five seconds.
+constexpr double k_first_date_s = 9.4e8, k_last_date_s = 4.2e9, k_most_uptime_s = 864000,
+                 k_least_flight_s = 5;
+
+/// Units in which sorted moments can be those of the rows of a flight.
+std::vector<TimeUnit> fitting_units(const std::vector<double>& times) {
+  std::vector<TimeUnit> out;
+  if (times.empty()) return out;
+  // Between the first and the last tenth, so that a stray row decides nothing.
+  const std::size_t n = times.size(), from = n / 10, to = n - 1 - from;
+  const double spacing = to > from ? (times[to] - times[from]) / static_cast<double>(to - from) : 0;
+  for (const auto& [unit, s] : k_unit_lengths) {
+    const double at_s = times[n / 2] * s, each_s = spacing * s;
+    if (at_s > k_first_date_s && at_s < k_last_date_s && each_s <= k_longest_of_date_s &&
+        (spacing == 0 || each_s >= k_shortest_s))
+      return {unit};
+    if (each_s >= k_shortest_s && each_s <= k_longest_s && std::abs(at_s) <= k_most_uptime_s &&
+        (times[to] - times[from]) * s >= 0.8 * k_least_flight_s)
+      out.push_back(unit);
+  }
+  return out;
+}
+
+/// Its topics as CSV (ulog2csv) have `timestamp` in microseconds since boot.
+bool is_px4(const ForeignTable& table) {
+  return std::ranges::any_of(table.columns(), [](const auto& column) {
+    return column == "timestamp_sample" || column == "ref_timestamp" || column == "timestamp_time_relative";
+  });
+}
+
+/// By its last word, or by one that is written together: TimeUS of ArduPilot.
+std::optional<TimeUnit> time_unit_of_name(std::string_view name) {
+  const auto at = name.rfind('_');
+  const auto word = at != std::string_view::npos ? name.substr(at + 1)
+                    : name.starts_with("time")   ? name.substr(4)
+                                                 : std::string_view();
+  if (at == std::string_view::npos && word == "s") return std::nullopt;  // "times"
+  if (word == "s" || word == "sec" || word == "secs" || word == "seconds") return TimeUnit::s;
+  if (word == "ms" || word == "msec") return TimeUnit::ms;
+  if (word == "us" || word == "usec") return TimeUnit::us;
+  if (word == "ns" || word == "nsec") return TimeUnit::ns;
+  return std::nullopt;
+}
+
 struct NumberedFix {
   FixNumbers numbers;
   std::array<std::optional<FixClass>, 7> of;  ///< by the number
@@ -177,28 +241,30 @@ double per_metre(LengthUnit unit) {
   return 1;
 }
 
-TimeReading time_reading(const ForeignTable& table, std::string_view column) {
+TimeGuess time_guess(const ForeignTable& table, std::string_view column) {
   const std::string name = plain_name(column);
   const auto sample = table.sample(column);
   const std::string_view first = sample.empty() ? std::string_view() : sample.front();
-  TimeReading out;
+  TimeGuess out;
   // A word "gps", or one that begins "gpst", at the beginning of the name or behind a "_".
   for (auto at = name.find("gps"); at != std::string::npos; at = name.find("gps", at + 1)) {
     const bool begins = at == 0 || name[at - 1] == '_', ends = at + 3 == name.size();
-    if (begins && (ends || name[at + 3] == 't' || name[at + 3] == '_')) out.scale = TimeScale::gps;
+    if (begins && (ends || name[at + 3] == 't' || name[at + 3] == '_')) out.reading.scale = TimeScale::gps;
   }
   if (has_colon_or_slash(first)) {
-    out.unit = TimeUnit::date;
+    out.reading.unit = TimeUnit::date;
     return out;
   }
-  const auto ending = name.ends_with("_usec") ? std::string("us") : name.substr(name.rfind('_') + 1);
-  const auto unit = name.find('_') == std::string::npos ? std::nullopt : k_time_unit_words.find(ending);
+  const auto units = time_unit_of_name(name)                ? std::vector{*time_unit_of_name(name)}
+                     : name == "timestamp" && is_px4(table) ? std::vector{TimeUnit::us}
+                                                            : fitting_units(times_of(table, column));
   const double v = table.number(first);
-  out.unit = unit && *unit != TimeUnit::date ? *unit
-             : v > 1e17                      ? TimeUnit::ns
-             : v > 1e14                      ? TimeUnit::us
-             : v > 1e11                      ? TimeUnit::ms
-                                             : TimeUnit::s;
+  out.reading.unit = !units.empty() ? units.front()
+                     : v > 1e17     ? TimeUnit::ns
+                     : v > 1e14     ? TimeUnit::us
+                     : v > 1e11     ? TimeUnit::ms
+                                    : TimeUnit::s;
+  if (units.size() > 1) out.fits = units;
   return out;
 }
 

@@ -4,6 +4,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "api/formats/foreign_table.hpp"
 #include "core/base/enum_table.hpp"
@@ -42,8 +43,13 @@ inline constexpr auto k_fix_numbers_words = enum_table<FixNumbers>({{"words", Fi
 
 bool contains(std::string_view text, std::string_view part);
 
-/// By the name of the column, else by how its first value looks.
-TimeReading time_reading(const ForeignTable& table, std::string_view column);
+struct TimeGuess {
+  TimeReading reading;
+  std::vector<TimeUnit> fits{};  ///< where two or more units are possible and a person has to say which
+};
+/// By the name of the column; by values that are moments of this century; by the rate of rows, which is 0.2
+/// Hz to 2 kHz; else by how its first value looks.
+TimeGuess time_guess(const ForeignTable& table, std::string_view column);
 /// By the ending of a column's name.
 std::optional<LengthUnit> unit_of_name(std::string_view column);
 LengthUnit range_unit(const ForeignTable& table, std::string_view column);

@@ -45,6 +45,10 @@ std::string outside(const FlightRows& rows) {
            first_s, last_s, poses.front().t_s, poses.back().t_s);
   const double ratio = (last_s - first_s) / std::max(rows.track_span_s, 1e-3);
   if (ratio > 100 || ratio < 0.01) why += ", and t_s is in seconds";
+  why +=
+      "; in tables of other programs --track-time and --range-time (Times of the track, of the ranges) say "
+      "unit "
+      "and clock, rows sent to /fixes and /ranges have t_us in microseconds";
   return why;
 }
 

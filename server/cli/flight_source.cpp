@@ -55,7 +55,7 @@ Result<void> read_time(std::string_view text, std::optional<api::TimeUnit>& unit
   return boost::outcome_v2::success();
 }
 
-Result<void> read_arm(std::string_view text, Eigen::Vector3d& arm_m) {
+Result<void> read_one_arm(std::string_view text, Eigen::Vector3d& arm_m) {
   for (int axis = 0; axis < 3; ++axis) {
     const auto end = text.find(',');
     const auto value = number(text.substr(0, end));
@@ -67,11 +67,28 @@ Result<void> read_arm(std::string_view text, Eigen::Vector3d& arm_m) {
   return boost::outcome_v2::success();
 }
 
+/// "0.1,0,-0.2", "0x6e01=0.1,0,-0.2", or several with ";" between them.
+Result<void> read_arms(std::string_view text, ForeignOptions& out) {
+  while (!text.empty()) {
+    const auto end = text.find(';');
+    const auto one = text.substr(0, end);
+    const auto equals = one.find('=');
+    if (equals == 0) return wrong("expected TAG=forward,left,up");
+    BOOST_OUTCOME_TRYV(equals == std::string_view::npos
+                           ? read_one_arm(one, out.lever_arm_body_m)
+                           : read_one_arm(one.substr(equals + 1),
+                                          out.lever_arms_body_m[std::string(one.substr(0, equals))]));
+    text.remove_prefix(end == std::string_view::npos ? text.size() : end + 1);
+  }
+  return boost::outcome_v2::success();
+}
+
 struct Setting {
   const char* name;
   const char* help;
   Result<void> (*read)(const std::string& text, ForeignOptions& out);
 };
+constexpr const char* k_lever_arm = "lever-arm";
 constexpr std::array k_settings{
     Setting{"tag", "Radio address of the tag, if no column has it",
             [](const std::string& text, ForeignOptions& out) -> Result<void> {
@@ -91,8 +108,9 @@ constexpr std::array k_settings{
               return boost::outcome_v2::success();
             }},
     Setting{
-        "lever-arm", "From that point to the tag in metres: forward,left,up",
-        [](const std::string& text, ForeignOptions& out) { return read_arm(text, out.lever_arm_body_m); }},
+        k_lever_arm,
+        "From that point to the tag in metres: forward,left,up; of several tags TAG=forward,left,up for each",
+        [](const std::string& text, ForeignOptions& out) { return read_arms(text, out); }},
     Setting{"lever-arm-sigma", "One sigma of that measurement in metres",
             [](const std::string& text, ForeignOptions& out) -> Result<void> {
               BOOST_OUTCOME_TRY(out.lever_arm_sigma_m, number(text));
@@ -137,6 +155,11 @@ constexpr std::array k_settings{
         [](const std::string& text, ForeignOptions& out) {
           return word(text, api::k_fix_numbers_words, out.fix_numbers);
         }},
+    Setting{"track-axes",
+            "x, y, z of the track: enu (east, north, up) or ned (north, east, down: PX4, ArduPilot)",
+            [](const std::string& text, ForeignOptions& out) {
+              return word(text, api::k_track_axes_words, out.axes);
+            }},
     Setting{"crs", "Coordinate system of x, y, z: EPSG:25832, UTM 32N, ECEF",
             [](const std::string& text, ForeignOptions& out) -> Result<void> {
               out.crs = text;
@@ -197,6 +220,11 @@ Result<void> read_mapping(const std::string& file, ForeignOptions& out) {
         if (!column.is_string())
           return wrong(file + ": " + key + '.' + field + " is not the name of a column");
         (key == "track" ? out.track_columns : out.range_columns)[field] = column.get<std::string>();
+      }
+    } else if (key == k_lever_arm && value.is_object()) {
+      for (const auto& [tag, arm] : value.items()) {
+        const auto read = read_setting(key, tag + '=' + (arm.is_string() ? arm.get<std::string>() : ""), out);
+        if (!read) return wrong(file + ": " + read.error().message);
       }
     } else if (key == "column_for_each_anchor" && value.is_boolean()) {
       out.column_for_each_anchor = value.get<bool>();
@@ -290,6 +318,19 @@ void add_foreign_source(CLI::App& command, ForeignSource& source) {
   for (const auto& setting : k_settings) {
     const std::string option = std::string("--") + setting.name;
     if (command.get_option_no_throw(option) != nullptr) continue;
+    if (setting.name == k_lever_arm) {
+      command
+          .add_option_function<std::vector<std::string>>(
+              option,
+              [&source](const std::vector<std::string>& arms) {
+                std::string& all = source.settings[k_lever_arm];
+                all.clear();
+                for (const auto& arm : arms) all += (all.empty() ? "" : ";") + arm;
+              },
+              setting.help)
+          ->allow_extra_args(false);
+      continue;
+    }
     command.add_option_function<std::string>(
         option, [&source, name = setting.name](const std::string& text) { source.settings[name] = text; },
         setting.help);

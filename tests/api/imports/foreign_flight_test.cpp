@@ -35,6 +35,7 @@ ForeignOptions given_of(const Json& one) {
   if (given.contains("heading")) out.heading = k_heading_kind_words.find(given["heading"].get<std::string>());
   if (given.contains("addresses"))
     out.addresses = k_address_kind_words.find(given["addresses"].get<std::string>());
+  if (given.contains("axes")) out.axes = k_track_axes_words.find(given["axes"].get<std::string>());
   if (given.contains("track_time_scale"))
     out.track_time_scale = k_time_scale_words.find(given["track_time_scale"].get<std::string>());
   if (given.contains("epoch_utc"))
@@ -200,6 +201,139 @@ TEST(ForeignFlight, NamesTheColumnsThatNothingUses) {
   EXPECT_NE(notes.find("r.csv: columns that are not used: battery\""), std::string::npos) << notes;
   EXPECT_NE(notes.find("taken as a position without RTK"), std::string::npos) << notes;
   EXPECT_EQ(flight.value().fixes.at(0).position.lon_deg, -3.7);
+}
+
+/// A row each `spacing`, of a place that stays above zero.
+ForeignTable table_every(const std::string& name, const std::string& head, const std::string& cells, int n,
+                         int spacing) {
+  std::string text = head + '\n';
+  for (int i = 0; i < n; ++i) text += std::to_string(100'000'000 + i * spacing) + ',' + cells + '\n';
+  return ForeignTable::parse(name, text).value();
+}
+
+TEST(ForeignFlight, AsksForAUnitOfTimesWhereTwoFitAndNamesTheOption) {
+  // 5000 apart: one row in 5 s by milliseconds, 200 Hz by microseconds.
+  const auto track = table_every("t.csv", "t,x,y,z", "1,2,3", 1200, 5000),
+             ranges = table_every("r.csv", "t,anchor,range_m", "0x6a21,7.4", 1200, 5000);
+  ForeignOptions options;
+  options.tag = "0x6e01";
+  EXPECT_EQ(foreign_needs(track, ranges, options),
+            (Needs{"unit of the track times", "unit of the range times"}));
+  const auto asked = foreign_flight(track, ranges, options);
+  ASSERT_FALSE(asked);
+  EXPECT_NE(asked.error().message.find("--track-time ms or us"), std::string::npos) << asked.error().message;
+  EXPECT_NE(asked.error().message.find("--range-time ms or us"), std::string::npos) << asked.error().message;
+  options.track_time_unit = options.range_time_unit = TimeUnit::us;
+  const auto said = foreign_flight(track, ranges, options);
+  ASSERT_TRUE(said) << said.error().message;
+  EXPECT_EQ(said.value().data.fixes.at(1).time.us() - said.value().data.fixes.at(0).time.us(), 5000);
+}
+
+TEST(ForeignFlight, ReadsOneColumnOfOneFileInOneUnit) {
+  const auto table = table_every("log.csv", "Timestamp,x,y,z,anchor,range_m", "1,2,3,0x6a21,7.4", 1200, 5000);
+  ForeignOptions options;
+  options.tag = "0x6e01";
+  options.range_time_unit = TimeUnit::ms;
+  const auto read = foreign_flight(table, table, options);
+  ASSERT_TRUE(read) << read.error().message;
+  EXPECT_EQ(read.value().data.fixes.back().time, read.value().data.ranges.back().time);
+  options.track_time_unit = TimeUnit::us;
+  const auto torn = foreign_flight(table, table, options);
+  ASSERT_FALSE(torn);
+  EXPECT_NE(torn.error().message.find("--track-time and --range-time the same"), std::string::npos)
+      << torn.error().message;
+}
+
+TEST(ForeignFlight, SaysThatItTurnedATrackThatCountsDownwards) {
+  const auto track = ForeignTable::parse("t.csv", "time,north,east,down\n1777888801.5,3,4,-5\n");
+  const auto ranges =
+      ForeignTable::parse("r.csv", "time,tag,anchor,range_m\n1777888801.5,0x6e01,0x6a21,7.4\n");
+  const auto flight = foreign_flight(track.value(), ranges.value(), {});
+  ASSERT_TRUE(flight) << flight.error().message;
+  const auto notes = Json(flight.value().data.notes).dump();
+  EXPECT_NE(notes.find("'down' counts downwards"), std::string::npos) << notes;
+  EXPECT_NE(notes.find("--track-axes enu"), std::string::npos) << notes;
+}
+
+TEST(ForeignFlight, TurnsAttitudesOfATrackThatCountsDownwards) {
+  // Nose to the east and 10 degrees up: in NED a yaw of 90 and a pitch of 10 degrees.
+  const double half_yaw = 45 * 3.14159265358979 / 180, half_pitch = 5 * 3.14159265358979 / 180;
+  const double w = std::cos(half_yaw) * std::cos(half_pitch), x = -std::sin(half_yaw) * std::sin(half_pitch),
+               y = std::cos(half_yaw) * std::sin(half_pitch), z = std::sin(half_yaw) * std::cos(half_pitch);
+  std::string row = "1777888801.5,3,4,-5";
+  for (const double part : {x, y, z, w}) row += ',' + std::to_string(part);
+  const auto track = ForeignTable::parse("t.csv", "time,north,east,down,qx,qy,qz,qw\n" + row + "\n");
+  const auto ranges =
+      ForeignTable::parse("r.csv", "time,tag,anchor,range_m\n1777888801.5,0x6e01,0x6a21,7.4\n");
+  const auto flight = foreign_flight(track.value(), ranges.value(), {});
+  ASSERT_TRUE(flight) << flight.error().message;
+  const auto& attitude = flight.value().data.fixes.at(0).enu_from_body;
+  ASSERT_TRUE(attitude);
+  const Eigen::Vector3d nose = *attitude * Eigen::Vector3d::UnitX(),
+                        left = *attitude * Eigen::Vector3d::UnitY();
+  EXPECT_LT((nose - Eigen::Vector3d(std::cos(2 * half_pitch), 0, std::sin(2 * half_pitch))).norm(), 1e-5);
+  EXPECT_LT((left - Eigen::Vector3d(0, 1, 0)).norm(), 1e-5);
+}
+
+struct TwoTags {
+  Result<ForeignTable> track = ForeignTable::parse("t.csv", "time,x,y,z\n1777888801.5,1,2,3\n");
+  Result<ForeignTable> ranges = ForeignTable::parse("r.csv",
+                                                    "time,tag,anchor,range_m\n1777888801.5,10,3,7.4\n"
+                                                    "1777888801.6,11,3,7.5\n1777888801.7,2,10,7.6\n");
+};
+
+TEST(ForeignFlight, SaysThatSeveralTagsHaveOneLeverArmAndThatAnAddressIsTagAndAnchor) {
+  const TwoTags tables;
+  ForeignOptions options;
+  options.lever_arm_body_m = {0.1, 0, -0.2};
+  const auto flight = foreign_flight(tables.track.value(), tables.ranges.value(), options);
+  ASSERT_TRUE(flight) << flight.error().message;
+  const auto notes = Json(flight.value().data.notes).dump();
+  EXPECT_NE(notes.find("3 tags"), std::string::npos) << notes;
+  EXPECT_NE(notes.find("--lever-arm TAG=FORWARD,LEFT,UP for each"), std::string::npos) << notes;
+  EXPECT_NE(notes.find(to_string(NetworkId{10}) + " is tag of some ranges and anchor of others"),
+            std::string::npos)
+      << notes;
+}
+
+TEST(ForeignFlight, TakesALeverArmForEachTagAndTurnsRangesThatAnAnchorBegan) {
+  const TwoTags tables;
+  ForeignOptions options;
+  options.lever_arms_body_m = {{"10", {0.1, 0, -0.2}}, {"0x0b", {-0.1, 0, -0.2}}};
+  const auto read = foreign_flight(tables.track.value(), tables.ranges.value(), options);
+  ASSERT_TRUE(read) << read.error().message;
+  const auto& data = read.value().data;
+  ASSERT_EQ(data.mission.tags.size(), 2U);
+  for (const auto& tag : data.mission.tags)
+    EXPECT_EQ(tag.lever_arm_body_m.x(), tag.tag == NetworkId{10} ? 0.1 : -0.1) << to_string(tag.tag);
+  EXPECT_EQ(data.ranges.at(2).tag, NetworkId{10});
+  EXPECT_EQ(data.ranges.at(2).anchor, NetworkId{2});
+  const auto notes = Json(data.notes).dump();
+  EXPECT_NE(notes.find("1 ranges were begun by the anchor"), std::string::npos) << notes;
+  EXPECT_EQ(notes.find("warning"), std::string::npos) << notes;
+}
+
+TEST(ForeignFlight, RefusesALeverArmOfNoTagAndATagWithoutOne) {
+  const TwoTags tables;
+  for (const auto& [arm_of, says] :
+       {std::pair{"77", "no range is of that tag"}, std::pair{"10", "has no lever arm"}}) {
+    ForeignOptions options;
+    options.lever_arms_body_m = {{arm_of, {0.1, 0, -0.2}}};
+    const auto flight = foreign_flight(tables.track.value(), tables.ranges.value(), options);
+    ASSERT_FALSE(flight);
+    EXPECT_NE(flight.error().message.find(says), std::string::npos) << flight.error().message;
+    EXPECT_NE(flight.error().message.find("--lever-arm"), std::string::npos) << flight.error().message;
+  }
+}
+
+TEST(ForeignFlight, NamesColumnOptionsWhereAPlaceHasNoColumn) {
+  const auto track = ForeignTable::parse("t.csv", "time,a,b,c\n1777888801.5,1,2,3\n");
+  const auto ranges =
+      ForeignTable::parse("r.csv", "time,tag,anchor,range_m\n1777888801.5,0x6e01,0x6a21,7.4\n");
+  const auto flight = foreign_flight(track.value(), ranges.value(), {});
+  ASSERT_FALSE(flight);
+  for (const char* option : {"--column track.lat=NAME", "track.x=NAME"})
+    EXPECT_NE(flight.error().message.find(option), std::string::npos) << flight.error().message;
 }
 
 }  // namespace

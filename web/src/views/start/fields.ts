@@ -1,4 +1,5 @@
 /// What a column of a flight's tables can be, and the names under which loggers write it. No DOM.
+import { is_east } from './axes';
 import { hemisphere_column } from './meaning';
 import { beyond, degrees_kind, MOST_LOCAL_M, numbers_of, type Table } from './table_file';
 
@@ -52,7 +53,7 @@ export const FIELD_WORDS: Record<(typeof TRACK_FIELDS)[number] | (typeof RANGE_F
 };
 const TIMES =
   't_s t_us t_ms t_ns time time_s time_ms time_us time_ns time_utc time_utc_usec timestamp timestamp_s timestamp_ms timestamp_us timestamp_ns t utc ' +
-  'gpst gps_time unix datetime date_time zeit';
+  'gpst gps_time unix datetime date_time zeit time_unix_usec time_usec timeus timems time_boot_ms t_utc';
 export const NAMES: Readonly<Record<Field, string>> = {
   time: TIMES,
   zone: 'tz timezone time_zone utc_offset tz_offset gmt_offset zeitzone',
@@ -70,9 +71,9 @@ export const NAMES: Readonly<Record<Field, string>> = {
     'alt_m height_m alt altitude height h altitude_m hoehe alt_msl alt_msl_m altitude_msl altitude_msl_m height_msl height_msl_m msl hmsl orthometric_height',
   separation:
     'geoid_separation geoid_separation_m geoid_sep geoidal_separation undulation undulation_m geoid_height geoid_height_m geoid_undulation',
-  x: 'x_m x e_m east east_m easting easting_m e rechtswert ostwert x_ecef_m ecef_x ecef_x_m e_baseline_m',
-  y: 'y_m y n_m north north_m northing northing_m n hochwert nordwert y_ecef_m ecef_y ecef_y_m n_baseline_m',
-  z: 'z_m z u_m up up_m z_ecef_m ecef_z ecef_z_m u_baseline_m',
+  x: 'x_m x e_m east east_m easting easting_m e rechtswert ostwert x_ecef_m ecef_x ecef_x_m e_baseline_m pe pe_m pos_e pos_e_m x_ned ned_x pos_ned_x pos_ned_0',
+  y: 'y_m y n_m north north_m northing northing_m n hochwert nordwert y_ecef_m ecef_y ecef_y_m n_baseline_m pn pn_m pos_n pos_n_m y_ned ned_y pos_ned_y pos_ned_1',
+  z: 'z_m z u_m up up_m z_ecef_m ecef_z ecef_z_m u_baseline_m pd pd_m pos_d pos_d_m down down_m z_ned ned_z pos_ned_z pos_ned_2',
   fix: 'fix fix_type quality fix_quality gps_qual rtk q carrsoln status',
   sigma_h: 'sd_h_m sigma_h_m hacc h_acc sd_h',
   sigma_v: 'sd_v_m sigma_v_m vacc v_acc sd_v sdu_m sigma_u_m',
@@ -114,6 +115,56 @@ function guessed(t: Table, fields: readonly Field[]): Columns {
   }
   return out;
 }
+interface Part {
+  readonly before: string;
+  readonly last: string;
+  readonly column: string;
+}
+/// Behind the last "_" of a plain name, and before it.
+const parts_of = (t: Table): readonly Part[] =>
+  t.columns.flatMap((column) => {
+    const [, before, last] = /^(.*)_([^_]*)$/.exec(plain(column).replace(/_m$/, '')) ?? [];
+    return before === undefined || last === undefined ? [] : [{ before, last, column }];
+  });
+const last_word = (name: string): string => name.slice(name.lastIndexOf('_') + 1);
+/// Columns of one message that have one name before their own (pose.position.x of ROS): those of the only name that has a column for each of `words`.
+function of_one_message(parts: readonly Part[], words: readonly RegExp[], name: RegExp): readonly string[] | null {
+  const complete = [...new Set(parts.map((p) => p.before))]
+    .filter((before) => name.test(last_word(before)))
+    .map((before) => words.map((w) => parts.filter((p) => p.before === before && w.test(p.last))))
+    .filter((found) => found.every((f) => f.length === 1));
+  return complete.length === 1 ? complete[0]!.map((f) => f[0]!.column) : null;
+}
+/// A field whose name is the last part of one column alone.
+const by_ending = (parts: readonly Part[], field: Field, words: RegExp): Columns => {
+  const found = parts.filter((p) => words.test(p.last));
+  return found.length === 1 ? { [field]: found[0]!.column } : {};
+};
+const TIME_ENDINGS = /^(time|timestamp|timeus)$/;
+const named_as = (fields: readonly Field[], columns: readonly string[] | null): Columns =>
+  Object.fromEntries((columns ?? []).map((c, i) => [fields[i]!, c]));
+/// Places and attitudes whose columns are called by the messages that they were in.
+function by_endings(t: Table, known: Columns): Columns {
+  const parts = parts_of(t),
+    time = known.time ? {} : by_ending(parts, 'time', TIME_ENDINGS);
+  if ((known.lat && known.lon) || (known.x && known.y)) return { ...time, ...known };
+  const globe = of_one_message(parts, [/^(lat|latitude)$/, /^(lon|lng|longitude)$/, /^(alt|altitude|height)$/], /./);
+  if (globe) return { ...known, ...time, ...named_as(['lat', 'lon', 'height'], globe) };
+  const place = of_one_message(
+      parts,
+      [/^x$/, /^y$/, /^z$/],
+      /^(position|pos|translation|pose|point|location|stateestimate|ned)$/,
+    ),
+    turn = of_one_message(parts, [/^x$/, /^y$/, /^z$/, /^w$/], /^(orientation|rotation|quaternion)$/);
+  return place
+    ? { ...named_as(['qx', 'qy', 'qz', 'qw'], turn), ...known, ...time, ...named_as(['x', 'y', 'z'], place) }
+    : { ...time, ...known };
+}
+/// North, east and down by their first letters.
+const with_down = (t: Table, c: Columns): Columns => {
+  const down = t.columns.findLast((x) => /^d(_m)?$/.test(plain(x)));
+  return !c.z && !c.height && is_east(c.x) && down !== undefined ? { ...c, z: down } : c;
+};
 export function guessed_track(t: Table): Columns {
   const {
       lat,
@@ -122,7 +173,10 @@ export function guessed_track(t: Table): Columns {
       lat_hemisphere: _lat,
       lon_hemisphere: _lon,
       ...named
-    } = guessed(t, [...TRACK_FIELDS, 'sigma_e', 'sigma_n', 'age', 'satellites', 'qx', 'qy', 'qz', 'qw']),
+    } = with_down(
+      t,
+      by_endings(t, guessed(t, [...TRACK_FIELDS, 'sigma_e', 'sigma_n', 'age', 'satellites', 'qx', 'qy', 'qz', 'qw'])),
+    ),
     north = hemisphere_column(t, lat, 'lat'),
     east = hemisphere_column(t, lon, 'lon'),
     rest = {
@@ -147,7 +201,16 @@ export function guessed_track(t: Table): Columns {
     ? { ...rest, z: height }
     : { ...rest, ...(lat ? { lat } : {}), ...(lon ? { lon } : {}), ...(height ? { height } : {}) };
 }
-export const guessed_ranges = (t: Table): Columns => guessed(t, [...RANGE_FIELDS, 'antenna', 'kind']);
+export function guessed_ranges(t: Table): Columns {
+  const parts = parts_of(t);
+  return {
+    ...by_ending(parts, 'time', TIME_ENDINGS),
+    ...by_ending(parts, 'anchor', /^anchor$/),
+    ...by_ending(parts, 'range', /^(range|distance)$/),
+    ...by_ending(parts, 'tag', /^tag$/),
+    ...guessed(t, [...RANGE_FIELDS, 'antenna', 'kind']),
+  };
+}
 export const missing_track = (c: Columns): readonly Field[] => {
   const globe = (['lat', 'lon', 'height'] as const).filter((f) => !c[f]),
     local = (['x', 'y', 'z'] as const).filter((f) => !c[f]);

@@ -1,6 +1,7 @@
 /// A flight from files: tables of track and ranges, their columns known by name or given by a person, as rows of the API. docs/formats.md. No DOM.
 import type { Wire } from '../../api/contract';
 import { num, obj, str } from '../../live/messages';
+import { enu_attitude, enu_of, is_east, track_axes, type TrackAxes } from './axes';
 import { is_local, missing_ranges, missing_track, type Columns, type Field } from './fields';
 import {
   heading_kind,
@@ -35,6 +36,7 @@ export interface About {
   readonly epoch_ms: number; ///< of t = 0, where times are seconds of the flight
   readonly point: 'gnss_antenna' | 'body' | 'tag_antenna';
   readonly lever_arm_m: readonly [number, number, number];
+  readonly lever_arms_m?: Readonly<Record<string, readonly [number, number, number]>>; ///< of tags by their text, of several
   readonly lever_arm_sigma_m: number | null; ///< how well the arms were measured; null: nobody says
   readonly tag: string; ///< where no column says it
 }
@@ -95,6 +97,7 @@ export interface Reading {
   readonly height: LengthUnit;
   readonly heading: HeadingKind | null; ///< null: a person has to say it
   readonly addresses: AddressKind | null; ///< null: a person has to say it
+  readonly axes?: TrackAxes | null; ///< of x, y, z; null: a person has to say it
   readonly wrong_unit: string; ///< what a column of units says that is not read; empty: nothing
 }
 export function guessed_reading(
@@ -105,6 +108,8 @@ export function guessed_reading(
   declared: Declared | null,
 ): Reading {
   const kind = place_kind(track, tc),
+    crs = declared?.crs ?? (kind === 'map' ? null : kind === 'ecef' ? 'ECEF' : ''),
+    track_time = time_reading(track, tc.time),
     of_ranges = unit_column(ranges, rc, 'range'),
     of_heights = unit_column(track, tc, is_local(tc) ? 'z' : 'height'),
     others = (['separation', 'x', 'y'] as const).map((f) => [f, unit_column(track, tc, f)] as const),
@@ -115,11 +120,12 @@ export function guessed_reading(
           ? ([track, is_local(tc) ? tc.z : tc.height, of_heights] as const)
           : others.flatMap(([f, u]) => (u && u.unit !== 'm' ? [[track, tc[f], u] as const] : []))[0];
   return {
-    track_time: time_reading(track, tc.time),
-    range_time: time_reading(ranges, rc.time),
+    track_time,
+    range_time: same_time(track, tc, ranges, rc) ? track_time : time_reading(ranges, rc.time),
     range: of_ranges?.unit ?? range_unit(ranges, rc.range),
     fix: tc.fix === undefined ? 'words' : fix_numbers(track, tc.fix, declared !== null),
-    crs: declared?.crs ?? (kind === 'map' ? null : kind === 'ecef' ? 'ECEF' : ''),
+    crs,
+    axes: declared || !is_local(tc) || kind === 'ecef' ? 'enu' : track_axes(track, tc, crs === ''),
     // Those of a flight folder are ellipsoidal.
     heights: declared ? (declared.heights ?? 'ellipsoidal') : heights_of(track, tc),
     height: of_heights?.unit ?? height_unit_of(track, tc, kind),
@@ -133,6 +139,9 @@ export function guessed_reading(
       : '',
   };
 }
+/// One column of one file, whose unit is the same for its track and its ranges.
+export const same_time = (track: Table, tc: Columns, ranges: Table, rc: Columns): boolean =>
+  track.name === ranges.name && tc.time !== undefined && tc.time === rc.time;
 /// What a person has to say before a flight can be read: fields without a column, and what no name shows.
 export type Need =
   | Field
@@ -141,6 +150,9 @@ export type Need =
   | 'fix numbers'
   | 'heading'
   | 'addresses'
+  | 'axes'
+  | 'unit of the track times'
+  | 'unit of the range times'
   | 'degrees'
   | 'crs'
   | 'heights';
@@ -152,6 +164,9 @@ export function needs_of(track: Table, tc: Columns, rc: Columns, reading: Readin
     ...(reading.fix === null ? (['fix numbers'] as const) : []),
     ...(reading.heading === null ? (['heading'] as const) : []),
     ...(reading.addresses === null ? (['addresses'] as const) : []),
+    ...(reading.axes === null ? (['axes'] as const) : []),
+    ...(reading.track_time.unit === null ? (['unit of the track times'] as const) : []),
+    ...(reading.range_time.unit === null ? (['unit of the range times'] as const) : []),
     ...(place_kind(track, tc) === 'no_degrees' ? (['degrees'] as const) : []),
     ...(reading.crs === null ? (['crs'] as const) : []),
     ...(heights_matter(tc, reading.crs) && reading.heights === null ? (['heights'] as const) : []),
@@ -243,6 +258,9 @@ export function flight_of(
   if (reading.fix === null) throw new Error('the meaning of the numbers of the fix class is not chosen');
   if (reading.heading === null) throw new Error('the unit of the heading is not chosen');
   if (reading.addresses === null) throw new Error('it is not chosen how addresses are written');
+  if (reading.axes === null) throw new Error('the axes of x, y, z are not chosen');
+  if (reading.track_time.unit === null || reading.range_time.unit === null)
+    throw new Error('the unit of the times is not chosen');
   if (reading.wrong_unit) throw new Error(reading.wrong_unit);
   if (reading.crs === null) throw new Error('the coordinate system of x, y, z is not chosen');
   if (heights_matter(tc, reading.crs) && reading.heights === null)
@@ -254,7 +272,9 @@ export function flight_of(
     rows = ranges_of(ranges, rc, reading, about, names, refused),
     // A pose in each range: several of one moment are one position.
     once = track === ranges ? [...new Map(fixes.map((f) => [f.t_us, f])).values()] : fixes,
-    heard = [...new Set(rows.map((r) => r.tag))];
+    heard = [...new Set(rows.map((r) => r.tag))],
+    how = reading.addresses,
+    arms = new Map(Object.entries(about.lever_arms_m ?? {}).map(([tag, arm]) => [written_address(tag, how), arm]));
   return {
     mission: {
       name: about.name || 'Imported flight',
@@ -265,7 +285,11 @@ export function flight_of(
       take_devices: false,
       tags:
         declared?.tags ??
-        heard.map((tag) => ({ tag, antenna: 0, lever_arm_body_m: [...about.lever_arm_m] as [number, number, number] })),
+        heard.map((tag) => ({
+          tag,
+          antenna: 0,
+          lever_arm_body_m: [...(arms.get(tag) ?? about.lever_arm_m)] as [number, number, number],
+        })),
     },
     fixes: once,
     ranges: rows,
@@ -311,6 +335,7 @@ function fixes_of(
     [east, north] = [signed('lon_hemisphere'), signed('lat_hemisphere')],
     place = (local ? (['x', 'y', 'z'] as const) : (['lon', 'lat', 'height'] as const)).map(value),
     own_frame = local && reading.crs === '',
+    [axes, named_east] = [reading.axes ?? 'enu', is_east(c.x)],
     per_degree = place_kind(t, c) === 'degrees_1e7' ? 1e7 : 1,
     separation = reading.heights === 'column' && heights_matter(c, reading.crs) ? value('separation') : () => 0,
     at_of = (row: readonly string[]): readonly [number, number, number] | null => {
@@ -318,7 +343,9 @@ function fixes_of(
         [x, y] = [east(row, x_read), north(row, y_read)],
         geoid = separation(row);
       if (x == null || y == null || z == null || geoid === null) return null;
-      return [x / (local ? 1 : per_degree), y / (local ? 1 : per_degree), z / PER_METRE[reading.height] + geoid];
+      if (!local) return [x / per_degree, y / per_degree, z / PER_METRE[reading.height] + geoid];
+      const [e_m, n_m, u_m] = enu_of([x, y, z / PER_METRE[reading.height]], axes, named_east);
+      return [e_m, n_m, u_m + geoid];
     },
     /// What can be no place of this kind; looked at in each row, for the first ones may look otherwise.
     wrong_place = (at: readonly [number, number, number] | null): string => {
@@ -380,7 +407,11 @@ function fixes_of(
         ...(local ? { local_m: at } : { lon: at[0], lat: at[1], h_m: at[2] }),
         fix: class_of(row),
         ...(up !== null && sides.every((x) => x !== null) ? { sigma_m: [...sides, up] } : {}),
-        ...(turn.every((x) => x !== null) ? { q: turn } : to === null ? {} : { heading_deg: ((to % 360) + 360) % 360 }),
+        ...(turn.every((x) => x !== null)
+          ? { q: enu_attitude(turn, axes) }
+          : to === null
+            ? {}
+            : { heading_deg: ((to % 360) + 360) % 360 }),
         ...(age!(row) === null ? {} : { correction_age_s: age!(row) }),
         ...(satellites!(row) === null ? {} : { satellites: satellites!(row) }),
       },

@@ -5,7 +5,7 @@ import { Bundle } from './bundle';
 import { guessed_ranges, guessed_track, missing_ranges, missing_track } from './fields';
 import { declared_of } from './flight_files';
 import { Mapping, type Found } from './mapping';
-import { decoded, table_of, type Table } from './table_file';
+import { decoded, no_table, table_of, type Table } from './table_file';
 import { entries_of, inflated } from './unzip';
 
 async function texts_of(files: readonly File[]): Promise<{ name: string; read: () => Promise<string> }[]> {
@@ -28,6 +28,8 @@ async function found_in(files: readonly File[]): Promise<Found> {
     tables: Table[] = [];
   for (const t of texts.filter((x) => /\.(csv|tsv|txt|pos|llh)$/.test(base(x.name)) && !base(x.name).includes('truth')))
     tables.push(table_of(base(t.name), await t.read()));
+  const other = tables.length ? undefined : texts.find((t) => /\.(gpx|kml|nmea|jsonl)$/.test(base(t.name)));
+  if (other) throw new Error(`${other.name}: ${no_table(await other.read())}`);
   if (!tables.length)
     throw new Error('It contains no table: a flight is flight.json, track.csv and ranges.csv, or only tables.');
   const named = (what: RegExp): Table | undefined => tables.find((t) => what.test(t.name)),

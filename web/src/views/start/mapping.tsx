@@ -6,6 +6,7 @@ import { on_globe, send_flight } from '../../api/imports';
 import { load_missions } from '../../state/archive';
 import { chosen_mission, say } from '../../state/store';
 import { fixed, grouped } from '../../ui/format';
+import { is_east, TRACK_AXES } from './axes';
 import {
   FIELD_WORDS,
   guessed_ranges,
@@ -25,6 +26,7 @@ import {
   needs_of,
   overlap_of,
   place_of,
+  same_time,
   type About,
   type Declared,
   type Flight,
@@ -32,8 +34,10 @@ import {
   type Reading,
 } from './flight_files';
 import { ADDRESS_KINDS, HEADING_KINDS, unused_columns } from './meaning';
+import { LeverArms } from './lever_arms';
 import { HEIGHT_WORDS, place_kind } from './places';
 import { anchor_columns, sample_of, with_a_row_for_each_range, type Table } from './table_file';
+import { tags_of } from './tags';
 import { FIX_NUMBERS, LENGTH_UNITS, TIME_UNITS, type TimeReading } from './values';
 
 export interface Found {
@@ -53,6 +57,9 @@ const NEED_WORDS = {
   'fix numbers': 'the meaning of the numbers of the fix class',
   heading: 'unit and direction of the heading',
   addresses: 'how addresses are written',
+  axes: 'whether z of the track counts upwards',
+  'unit of the track times': 'the unit of the times of the track',
+  'unit of the range times': 'the unit of the times of the ranges',
   degrees:
     'latitude and longitude in decimal degrees (degrees and minutes, or one for the other?), or x and y of a map',
   crs: 'the coordinate system of x, y, z',
@@ -85,7 +92,9 @@ export function Mapping({ found, back }: { found: Found; back: () => void }) {
     kind = useMemo(() => place_kind(track, tc), [track, tc]),
     above_something = heights_matter(tc, reading.crs),
     needs = needs_of(track, tc, rc, reading, about.tag),
-    complete = !needs.some((n) => !(n in NEED_WORDS)),
+    one_time = same_time(track, tc, ranges, rc),
+    complete =
+      !needs.some((n) => !(n in NEED_WORDS)) && ![reading.track_time.unit, reading.range_time.unit].includes(null),
     missing = needs.map(
       (n) => NEED_WORDS[n as keyof typeof NEED_WORDS] ?? field_words(n as Field | 'time of the ranges'),
     ),
@@ -100,6 +109,7 @@ export function Mapping({ found, back }: { found: Found; back: () => void }) {
           : [...unused_columns(track, [tc]), ...unused_columns(ranges, [rc])],
       [track, tc, ranges, rc],
     ),
+    [tags, both] = useMemo(() => tags_of(ranges, rc), [ranges, rc]),
     wide =
       !rc.anchor && !rc.range ? anchor_columns(ranges, Object.values({ ...rc, ...(track === ranges ? tc : {}) })) : [];
   const sigma_m = arm_sigma.trim() === '' ? null : Number(arm_sigma.replace(',', '.')),
@@ -201,13 +211,13 @@ export function Mapping({ found, back }: { found: Found; back: () => void }) {
           label="Times of the track"
           of="track-time"
           value={reading.track_time}
-          set={(track_time) => set_given({ ...given, track_time })}
+          set={(track_time) => set_given({ ...given, track_time, ...(one_time ? { range_time: track_time } : {}) })}
         />
         <TimeFields
           label="Times of the ranges"
           of="range-time"
           value={reading.range_time}
-          set={(range_time) => set_given({ ...given, range_time })}
+          set={(range_time) => set_given({ ...given, range_time, ...(one_time ? { track_time: range_time } : {}) })}
         />
         <Choice
           label="Ranges are in"
@@ -232,6 +242,15 @@ export function Mapping({ found, back }: { found: Found; back: () => void }) {
             value={reading.heading}
             words={HEADING_KINDS}
             set={(heading) => set_given({ ...given, heading })}
+          />
+        )}
+        {is_local(tc) && asked.axes !== 'enu' && (
+          <Choice
+            label={is_east(tc.x) ? `Heights, column ${tc.z}, are of` : 'x, y, z of the track are'}
+            id="import-axes"
+            value={reading.axes ?? null}
+            words={TRACK_AXES}
+            set={(axes) => set_given({ ...given, axes })}
           />
         )}
         {asked.addresses === null && (
@@ -300,6 +319,13 @@ export function Mapping({ found, back }: { found: Found; back: () => void }) {
           {apart_words(overlap)}
         </p>
       )}
+      {both.length > 0 && (
+        <p class="caution" data-testid="import-both">
+          {both.slice(0, 8).join(', ')} {both.length === 1 ? 'is' : 'are'} tag of some ranges and anchor of others.
+          Where the anchor began the exchange, tag and anchor are exchanged: write the tag first in each row; ranges
+          between anchors have kind anchor_anchor.
+        </p>
+      )}
       <div class="fields">
         <label>
           <span class="lab">Name</span>
@@ -334,25 +360,7 @@ export function Mapping({ found, back }: { found: Found; back: () => void }) {
                 <option value="tag_antenna">the tag's antenna</option>
               </select>
             </label>
-            {about.point !== 'tag_antenna' && (
-              <fieldset class="arm">
-                <legend class="lab">From there to the tag: forward, left, up, m</legend>
-                {[0, 1, 2].map((i) => (
-                  <input
-                    key={i}
-                    class="cell"
-                    inputMode="decimal"
-                    aria-label={['Forward, m', 'Left, m', 'Up, m'][i]}
-                    value={about.lever_arm_m[i]}
-                    onChange={(e) => {
-                      const arm = [...about.lever_arm_m] as [number, number, number];
-                      arm[i] = Number(e.currentTarget.value.replace(',', '.')) || 0;
-                      set_about({ ...about, lever_arm_m: arm });
-                    }}
-                  />
-                ))}
-              </fieldset>
-            )}
+            {about.point !== 'tag_antenna' && <LeverArms tags={tags} about={about} set={set_about} />}
           </>
         )}
         {about.point !== 'tag_antenna' && (
@@ -455,7 +463,7 @@ function apart_words({ share, track_us, ranges_us }: Overlap): string {
     `Ranges: ${span(ranges_us)} UTC, ${grouped(Math.round(Math.abs(apart_s)))} s ${apart_s < 0 ? 'earlier' : 'later'}. ` +
     (Math.abs(Math.abs(apart_s) - 18) < 3
       ? 'That looks like GPS time in one of them.'
-      : 'Ranges outside it get no position: check units and clocks.')
+      : 'Ranges outside it get no position: check units and clocks under Times of the track and of the ranges.')
   );
 }
 

@@ -52,13 +52,41 @@ function decimal_of(separator: string, rows: readonly (readonly string[])[]): '.
   return commas > points ? ',' : '.';
 }
 
+const VALUE = /^[0-9.:/+-]*[0-9][0-9.:/+-]*$/; ///< a number, a date or a time of day
+/// Why a text is no table of names and rows, and what reads it; empty where it may be one.
+export function no_table(text: string): string {
+  const line = text.split('\n', 200).find((l) => l.trim() !== '' && !l.startsWith('#')) ?? '',
+    head = text.slice(0, 2000).toLowerCase();
+  if (line.startsWith('<'))
+    return head.includes('<gpx')
+      ? 'GPX is no table: write its points as CSV with time, lat, lon and alt, or give the log of the receiver itself'
+      : head.includes('<kml')
+        ? 'KML is no table: anchord plan import reads plans of it; write the points of a track as CSV with time, lat, lon and alt'
+        : 'XML is no table: write it as CSV with a header line of names';
+  if (/^[{[]/.test(line))
+    return 'JSON is no table: write it as CSV with a header line of names; anchord decode FILE > track.csv reads JSON of gpsd';
+  if (line.startsWith('$')) return 'a log of NMEA is no table: anchord decode FILE > track.csv makes one of it';
+  const words = line.split(/[,;|\s]+/).filter((w) => w !== ''),
+    values = words.filter((w) => VALUE.test(w)).length;
+  return words.length > 1 && VALUE.test(words[0]!) && 2 * values >= words.length
+    ? 'the first line has numbers; a header line with names is needed: write one above it, or let anchord decode FILE > track.csv read it where it has ' +
+        'lines of LLH (Emlid, RTKLIB)'
+    : '';
+}
+
 /// Error: what is wrong, and in which row, counted as a spreadsheet does: the header is row 1.
-export function table_of(name: string, text: string): Table {
-  const rtklib = text.startsWith('%') ? of_rtklib(text) : null,
+export function table_of(name: string, whole: string): Table {
+  const why = no_table(whole);
+  if (why) throw new Error(`${name}: ${why}`);
+  // The line by which Excel is told the separator.
+  const [told, separator] = /^"?sep=([^\r\n])"?\r?\n/i.exec(whole) ?? ['', ''],
+    text = whole.slice(told.length),
+    rtklib = text.startsWith('%') ? of_rtklib(text) : null,
     read = rtklib
       ? null
       : Papa.parse<string[]>(text, {
           comments: '#',
+          ...(separator ? { delimiter: separator } : {}),
           skipEmptyLines: 'greedy',
           delimitersToGuess: [',', ';', '\t', '|'],
         }),

@@ -6,7 +6,7 @@ export type TimeUnit = 's' | 'ms' | 'us' | 'ns' | 'date';
 /// UTC, or the time of GPS: 18 s ahead of UTC since 2017; its numbers count from 6 January 1980.
 export type TimeScale = 'utc' | 'gps';
 export interface TimeReading {
-  readonly unit: TimeUnit;
+  readonly unit: TimeUnit | null; ///< null: two or more are possible, and a person has to say it
   readonly scale: TimeScale;
 }
 export const TIME_UNITS: Record<TimeUnit, string> = {
@@ -23,15 +23,76 @@ export const unit_of_name = (column: string | undefined): LengthUnit | undefined
   /_(m|cm|mm)$/.exec(plain(column ?? ''))?.[1] as LengthUnit | undefined;
 export const PER_METRE: Record<LengthUnit, number> = { m: 1, cm: 100, mm: 1000 };
 
-/// By the name of the column, else by how its first value looks.
+/// By its last word, or by one that is written together: TimeUS of ArduPilot.
+function time_unit_of_name(name: string): TimeUnit | undefined {
+  const word = /_([a-z]+)$/.exec(name)?.[1] ?? /^time(?!s$)([a-z]+)$/.exec(name)?.[1] ?? '';
+  return /^(s|sec|secs|seconds)$/.test(word) ? 's' : (/^([mun]s)(ec)?$/.exec(word)?.[1] as TimeUnit | undefined);
+}
+/// Topics of PX4 as CSV (ulog2csv) have `timestamp` in microseconds since boot.
+const is_px4 = (t: Table): boolean =>
+  ['timestamp_sample', 'ref_timestamp', 'timestamp_time_relative'].some((c) => t.columns.includes(c));
+
+/// 2 kHz to 0.2 Hz; of moments that a calendar shows (1999 to 2103), gaps do no harm. Those since a machine was switched on: at most ten days of work, and a
+/// flight of at least five seconds.
+const SHORTEST_S = 1 / 2000;
+const LONGEST_S = 5;
+const LONGEST_OF_DATE_S = 499;
+const FIRST_DATE_S = 9.4e8;
+const LAST_DATE_S = 4.2e9;
+const MOST_UPTIME_S = 864_000;
+const LEAST_FLIGHT_S = 5;
+/// Units in which the moments of a column can be those of the rows of a flight.
+function fitting_units(t: Table, column: string | undefined): readonly TimeUnit[] {
+  const at = column === undefined ? -1 : t.columns.indexOf(column),
+    times = [...new Set(t.rows.map((r) => number_of(r[at] ?? '', t.decimal)).filter(Number.isFinite))].sort(
+      (a, b) => a - b,
+    ),
+    n = times.length;
+  if (!n) return [];
+  // Between the first and the last tenth, so that a stray row decides nothing.
+  const from = Math.floor(n / 10),
+    to = n - 1 - from,
+    span = times[to]! - times[from]!,
+    spacing = to > from ? span / (to - from) : 0,
+    out: TimeUnit[] = [];
+  for (const [unit, s] of [
+    ['s', 1],
+    ['ms', 1e-3],
+    ['us', 1e-6],
+    ['ns', 1e-9],
+  ] as const) {
+    const [at_s, each_s] = [times[Math.floor(n / 2)]! * s, spacing * s];
+    if (
+      at_s > FIRST_DATE_S &&
+      at_s < LAST_DATE_S &&
+      each_s <= LONGEST_OF_DATE_S &&
+      (spacing === 0 || each_s >= SHORTEST_S)
+    )
+      return [unit];
+    if (
+      each_s >= SHORTEST_S &&
+      each_s <= LONGEST_S &&
+      Math.abs(at_s) <= MOST_UPTIME_S &&
+      span * s >= 0.8 * LEAST_FLIGHT_S
+    )
+      out.push(unit);
+  }
+  return out;
+}
+
+/// By the name of the column; by values that are moments of this century; by the rate of rows, which is 0.2 Hz to 2 kHz; else by how its first value looks.
 export function time_reading(t: Table, column: string | undefined): TimeReading {
   const name = plain(column ?? ''),
     first = sample_of(t, column)[0] ?? '',
     v = number_of(first, t.decimal),
-    scale: TimeScale = /(^|_)gps(t|_|$)/.test(name) ? 'gps' : 'utc',
-    ending = /_(s|ms|us|ns)$/.exec(name.replace(/_usec$/, '_us'))?.[1] as TimeUnit | undefined;
+    scale: TimeScale = /(^|_)gps(t|_|$)/.test(name) ? 'gps' : 'utc';
   if (/[:/]/.test(first)) return { unit: 'date', scale };
-  return { unit: ending ?? (v > 1e17 ? 'ns' : v > 1e14 ? 'us' : v > 1e11 ? 'ms' : 's'), scale };
+  const named = time_unit_of_name(name) ?? (name === 'timestamp' && is_px4(t) ? 'us' : undefined),
+    units = named ? [named] : fitting_units(t, column);
+  return {
+    unit: units.length > 1 ? null : (units[0] ?? (v > 1e17 ? 'ns' : v > 1e14 ? 'us' : v > 1e11 ? 'ms' : 's')),
+    scale,
+  };
 }
 export function range_unit(t: Table, column: string | undefined): LengthUnit {
   const ending = unit_of_name(column),
@@ -76,6 +137,7 @@ export function time_us(cell: string, { unit, scale }: TimeReading, decimal: '.'
       gps = /GPST$/i.test(cell) || (scale === 'gps' && !/(Z|UTC|GMT|[+-]\d\d:?\d\d)$/i.test(cell));
     return gps ? us - leaps_us(us) : us;
   }
+  if (unit === null) return NaN;
   const us = number_of(cell, decimal) * { s: 1e6, ms: 1e3, us: 1, ns: 1e-3 }[unit];
   // Some hours or days count from the beginning of the flight; decades are since 1970, or since 1980.
   if (us < 3e14) return Math.round(epoch_ms * 1000 + us);

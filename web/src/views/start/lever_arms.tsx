@@ -1,0 +1,73 @@
+/// From the point of the track to the tag, or to each of several.
+import type { About } from './flight_files';
+
+type Arm = readonly [number, number, number];
+const MOST_TAGS = 8;
+
+export function LeverArms({
+  tags,
+  about,
+  set,
+}: {
+  tags: readonly string[];
+  about: About;
+  set: (about: About) => void;
+}) {
+  if (tags.length < 2)
+    return (
+      <ArmFields
+        legend="From there to the tag: forward, left, up, m"
+        of=""
+        arm={about.lever_arm_m}
+        set={(lever_arm_m) => set({ ...about, lever_arm_m })}
+      />
+    );
+  return (
+    <>
+      <p class="caution" data-testid="import-tags">
+        The ranges are of {tags.length} tags, which cannot be in one place: each has its own lever arm.
+      </p>
+      {tags.slice(0, MOST_TAGS).map((tag) => (
+        <ArmFields
+          key={tag}
+          legend={`From there to tag ${tag}: forward, left, up, m`}
+          of={`, tag ${tag}`}
+          arm={about.lever_arms_m?.[tag] ?? about.lever_arm_m}
+          set={(arm) => set({ ...about, lever_arms_m: { ...about.lever_arms_m, [tag]: arm } })}
+        />
+      ))}
+    </>
+  );
+}
+
+function ArmFields({
+  legend,
+  of,
+  arm,
+  set,
+}: {
+  legend: string;
+  of: string;
+  arm: Arm;
+  set: (arm: [number, number, number]) => void;
+}) {
+  return (
+    <fieldset class="arm">
+      <legend class="lab">{legend}</legend>
+      {[0, 1, 2].map((i) => (
+        <input
+          key={i}
+          class="cell"
+          inputMode="decimal"
+          aria-label={`${['Forward, m', 'Left, m', 'Up, m'][i]}${of}`}
+          value={arm[i]}
+          onChange={(e) => {
+            const changed = [...arm] as [number, number, number];
+            changed[i] = Number(e.currentTarget.value.replace(',', '.')) || 0;
+            set(changed);
+          }}
+        />
+      ))}
+    </fieldset>
+  );
+}
