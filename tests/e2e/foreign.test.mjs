@@ -224,6 +224,197 @@ test('a receiver log of NMEA and a column for each anchor give the anchors of th
   same((await solved('--track', nmea, '--ranges', wide, '--tag', '0x6e01', '--column-for-each-anchor')).anchors);
 });
 
+/** East, north, up of the track in metres, from its first position; near enough to flat for one flight. */
+const local_places = () => {
+  const [first] = track,
+    per_degree = 111_320;
+  return track.map((r) => [
+    (r.lon_deg - first.lon_deg) * per_degree * Math.cos((first.lat_deg * Math.PI) / 180),
+    (r.lat_deg - first.lat_deg) * per_degree,
+    r.alt_m - first.alt_m + 0.1,
+  ]);
+};
+const since_boot_us = (t_s) => Math.round(61_234_000 + Number(t_s) * 1e6);
+/** The same anchors of a local frame, to 2 mm. */
+function same_local(anchors, wanted_local) {
+  assert.deepEqual([...anchors.keys()].sort(), [...wanted_local.keys()].sort());
+  for (const [id, a] of wanted_local) {
+    const b = anchors.get(id);
+    assert.equal(b.verdict, a.verdict, id);
+    if (a.enu_m)
+      assert.ok(Math.hypot(...a.enu_m.map((v, i) => v - b.enu_m[i])) < 0.002, `${id}: ${a.enu_m} ${b.enu_m}`);
+  }
+}
+
+test('tracks that count north, east, down, and times since boot, give the anchors of east, north, up', async () => {
+  const places = local_places(),
+    tag = ['--tag', '0x6e01', '--lever-arm', '0,0,-0.3'],
+    fixed = (v) => v.map((x) => Number(x).toFixed(4)),
+    enu = write('enu.csv', ['t_s,east,north,up,fix', ...track.map((r, i) => [r.t_s, ...fixed(places[i]), r.fix])]),
+    ned = ([e, n, u]) => fixed([n, e, -u]),
+    px4 = write('vehicle_local_position_0.csv', [
+      'timestamp,timestamp_sample,ref_timestamp,ref_lat,ref_lon,x,y,z,vx,vy,vz,xy_valid,z_valid,fix',
+      ...track.map((r, i) => [
+        since_boot_us(r.t_s),
+        since_boot_us(r.t_s) - 300,
+        6e7,
+        51,
+        3.7,
+        ...ned(places[i]),
+        ...[0, 0, 0, 1, 1],
+        r.fix,
+      ]),
+    ]),
+    bare = write('bare.csv', [
+      'timestamp,x,y,z,fix',
+      ...track.map((r, i) => [since_boot_us(r.t_s), ...ned(places[i]), r.fix]),
+    ]),
+    seconds = write('uwb_s.csv', ['t_s,anchor,range_m', ...ranges.map((r) => [r.t_s, r.anchor_id, r.range_m])]),
+    micros = write('uwb_us.csv', [
+      'timestamp,anchor,range_m',
+      ...ranges.map((r) => [since_boot_us(r.t_s), r.anchor_id, r.range_m]),
+    ]),
+    up = (await solved('--track', enu, '--ranges', seconds, ...tag)).anchors,
+    of_px4 = await solved('--track', px4, '--ranges', micros, ...tag);
+  assert.ok([...up.values()].some((a) => a.enu_m));
+  same_local(of_px4.anchors, up);
+  assert.match(of_px4.stderr, /'z' counts downwards, x is north and y east/);
+  const asked = await run(['solve', '--track', bare, '--ranges', micros, ...tag]);
+  assert.equal(asked.code, 2);
+  assert.match(asked.stderr, /--track-axes ned/);
+  same_local((await solved('--track', bare, '--ranges', micros, ...tag, '--track-axes', 'ned')).anchors, up);
+});
+
+test('a log in milliseconds since boot is read in one unit, whichever option gives it', async () => {
+  const places = local_places(),
+    names = [...new Set(ranges.map((r) => r.anchor_id))],
+    log = write('cfclient.csv', [
+      ['Timestamp', ...names, 'stateEstimate.x', 'stateEstimate.y', 'stateEstimate.z'].join(','),
+      ...ranges
+        .slice(0, 400)
+        .map((r, i) => [
+          Math.round(12_300 + Number(r.t_s) * 1e3),
+          ...names.map((n) => (n === r.anchor_id ? r.range_m : '')),
+          ...places[Math.min(i, places.length - 1)].map((v) => v.toFixed(4)),
+        ]),
+    ]),
+    of = async (...more) =>
+      (await solved('--ranges', log, '--tag', '0x6e01', '--column-for-each-anchor', ...more)).anchors,
+    plain = await of();
+  assert.deepEqual(await of('--range-time', 'ms'), plain);
+  assert.deepEqual(await of('--track-time', 'ms'), plain);
+  const torn = await run([
+    ...['solve', '--ranges', log, '--tag', '0x6e01', '--column-for-each-anchor'],
+    ...['--track-time', 'ms', '--range-time', 'us'],
+  ]);
+  assert.equal(torn.code, 2);
+  assert.match(torn.stderr, /--track-time and --range-time the same/);
+});
+
+test('tracks and ranges that are apart name the options of their times', async () => {
+  const late = write('late.csv', [
+      'timestamp_us,anchor,range_m',
+      ...ranges.map((r) => [utc_us(r.t_s) + 864e8, r.anchor_id, r.range_m]),
+    ]),
+    table = write('gnss_apart.csv', [
+      'time_us,lat,lon,h_ell,fix',
+      ...track.map((r) => [utc_us(r.t_s), r.lat_deg, r.lon_deg, r.alt_m, r.fix]),
+    ]),
+    { code, stderr } = await run(['solve', '--track', table, '--ranges', late, '--tag', '0x6e01']);
+  assert.equal(code, 2);
+  assert.match(stderr, /none of \d+ ranges could be placed.*--track-time and --range-time.*t_us/);
+});
+
+test('several tags with one lever arm are a warning in words and JSON; each may have its own', async () => {
+  const table = write('gnss_tags.csv', [
+      'time_us,lat,lon,h_ell,fix,heading_deg',
+      ...track.map((r) => [utc_us(r.t_s), r.lat_deg, r.lon_deg, r.alt_m, r.fix, 90]),
+    ]),
+    two = write('two_tags.csv', [
+      'time_us,tag,anchor,range_m',
+      ...ranges.map((r, i) => [utc_us(r.t_s), i % 2 ? '0x6e01' : '0x6e02', r.anchor_id, r.range_m]),
+    ]),
+    solve = (...arms) =>
+      run(['solve', '--track', table, '--ranges', two, ...arms.flatMap((a) => ['--lever-arm', a]), '--format', 'json']),
+    notes = ({ stdout }) => JSON.parse(stdout).flights[0].notes.join('\n'),
+    one = await solve('0.3,0,-0.2');
+  assert.equal(one.code, 0, one.stderr);
+  assert.match(one.stderr, /warning: .*2 tags \(.*\) have one lever arm.*--lever-arm TAG=/);
+  assert.match(notes(one), /2 tags \(.*\) have one lever arm/);
+  const each = await solve('0x6e01=0.3,0,-0.2', '0x6e02=-0.3,0,-0.2');
+  assert.equal(each.code, 0, each.stderr);
+  assert.doesNotMatch(notes(each), /have one lever arm/);
+  const mapping = write('arms.json', ['{"lever-arm": {"0x6e01": "0.3,0,-0.2", "0x6e02": "-0.3,0,-0.2"}}']),
+    mapped = await run(['solve', '--track', table, '--ranges', two, '--mapping', mapping, '--format', 'json']);
+  assert.equal(mapped.stdout, each.stdout);
+  const unknown = await solve('0x6e03=0,0,0');
+  assert.equal(unknown.code, 2);
+  assert.match(unknown.stderr, /no range is of that tag/);
+});
+
+test('what anchord decode writes is a track, and files that are no tables name what reads them', async () => {
+  const gpx = write('flight.gpx', ['<?xml version="1.0"?><gpx version="1.1"><trk><trkseg></trkseg></trk></gpx>']),
+    llh = write(
+      'emlid.LLH',
+      track.map((r) => `${date(utc_us(r.t_s), '/')} ${r.lat_deg} ${r.lon_deg} ${r.alt_m}${quality(r)}`),
+    ),
+    refused = async (file) => (await run(['solve', '--track', file, '--ranges', pozyx()])).stderr;
+  assert.match(await refused(gpx), /GPX is no table: write its points as CSV/);
+  assert.match(await refused(llh), /anchord decode FILE > track\.csv/);
+  const decoded = await run(['decode', llh]);
+  assert.equal(decoded.code, 0, decoded.stderr);
+  same(
+    (await solved('--track', write('decoded.csv', [decoded.stdout.trim()]), '--ranges', pozyx())).anchors,
+    wanted_of_rtklib,
+  );
+});
+
+test('the page asks which way z counts, and gives each of several tags its lever arm', async () => {
+  const server = await startServer({ auth: 'off' }),
+    browser = await openBrowser();
+  try {
+    const places = local_places(),
+      table = write('mocap.csv', [
+        'time_us,x,y,z',
+        ...track.map((r, i) => [utc_us(r.t_s), places[i][1], places[i][0], -places[i][2]].join(',')),
+      ]),
+      two = write('tags.csv', [
+        'time_us,tag,anchor,range_m',
+        ...ranges.map((r, i) => [utc_us(r.t_s), i % 2 ? '0x6e01' : '0x6e02', r.anchor_id, r.range_m]),
+      ]),
+      { page, seen, id } = await openPage(browser, server, { hash: '#/import' });
+    await id('dropzone').waitFor();
+    await page.getByLabel('Flight files').setInputFiles([table, two]);
+    await id('mapping').waitFor();
+    await id('import-tags').waitFor();
+    assert.equal(await id('import-send').isEnabled(), false, 'nobody says which way z counts');
+    await id('import-axes').selectOption('ned');
+    await page.getByLabel('Up, m, tag 0x6e02').fill('-0.25');
+    await id('import-name').fill('Two tags');
+    await id('import-send').click();
+    const get = async (path) => (await server.fetch(path)).json();
+    const mission = await eventually(
+      'it is in',
+      async () =>
+        (await get('/api/v1/missions')).items.find((m) => m.name === 'Two tags' && m.state === 'finished') ?? false,
+      60_000,
+    );
+    assert.deepEqual(Object.fromEntries(mission.tags.map((t) => [Number(t.tag), t.lever_arm_body_m])), {
+      0x6e01: [0, 0, 0],
+      0x6e02: [0, 0, -0.25],
+    });
+    const { items } = await get(`/api/v1/fixes?mission=${mission.id}&limit=1000&sort=t_us`);
+    items.forEach((fix, i) => {
+      fix.local_m.forEach((v, axis) => assert.ok(Math.abs(v - places[i][axis]) < 1e-6, `${fix.local_m} ${places[i]}`));
+    });
+    assert.deepEqual(seen.errors, []);
+    await page.close();
+  } finally {
+    await browser.close();
+    await server.dispose();
+  }
+});
+
 test('the page asks for the system of map coordinates, and stores the places of the flight folder', async () => {
   const server = await startServer({ auth: 'off' }),
     browser = await openBrowser();
