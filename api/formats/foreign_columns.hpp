@@ -67,7 +67,7 @@ inline constexpr std::array k_foreign_fields{
                "anchor_id anchor anchor_address anchor_name remote remote_id dest destination anker"},
     FieldNames{"range",
                "range_m distance_m range distance dist range_mm distance_mm dist_m dist_mm range_cm "
-               "distance_cm abstand"},
+               "distance_cm abstand entfernung entfernung_m entfernung_cm entfernung_mm"},
     FieldNames{"tag", "tag_id tag tag_address source local_id"},
     FieldNames{"rss", "rss_dbm rss rssi"},
     FieldNames{"rx", "rx_dbm rx_power rx"},

@@ -129,8 +129,9 @@ Result<ForeignTable> ForeignTable::parse(std::string name, std::string_view byte
   if (std::ranges::all_of(table.columns_, is_number))
     return table.error(": the first line has numbers; a header line with names is needed");
   for (auto c = table.columns_.begin(); c != table.columns_.end(); ++c) {
-    if (!c->empty() && std::find(std::next(c), table.columns_.end(), *c) != table.columns_.end())
-      return table.error(": two columns have the name \"" + *c + '"');
+    if (c->empty() || std::find(std::next(c), table.columns_.end(), *c) == table.columns_.end()) continue;
+    return table.error(": two columns have the name \"" + *c + '"' +
+                       (is_number(*c) ? ", which is a number; a header line with names is needed" : ""));
   }
   return table;
 }

@@ -46,6 +46,18 @@ class FlightFolder : public ::testing::Test {
   void expect_error(const std::string& part) { EXPECT_NE(error().find(part), std::string::npos) << error(); }
 };
 
+TEST_F(FlightFolder, ReadsTablesWhoseFirstLineTellsExcelTheSeparator) {
+  globe();
+  write("track.csv",
+        "sep=;\r\nt_s;lat_deg;lon_deg;alt_m;fix;yaw\r\n0.0;50.1;4.2;80;2;60\r\n0.5;50.2;4.3;81;2;61\r\n");
+  write("ranges.csv", "sep=,\nt_s,anchor_id,range_m\n0.1,3,6.14\n");
+  const auto read = read_flight_folder(folder_);
+  ASSERT_TRUE(read) << read.error().message;
+  EXPECT_EQ(read.value().fixes.size(), 2U);
+  EXPECT_EQ(read.value().ranges.size(), 1U);
+  EXPECT_NEAR(read.value().fixes.at(1).position.lat_deg, 50.2, 1e-12);
+}
+
 TEST_F(FlightFolder, ReadsATrackOnTheGlobe) {
   globe();
   const auto read = read_flight_folder(folder_);

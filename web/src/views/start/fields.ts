@@ -87,7 +87,8 @@ export const NAMES: Readonly<Record<Field, string>> = {
   qz: 'qz',
   qw: 'qw',
   anchor: 'anchor_id anchor anchor_address anchor_name remote remote_id dest destination anker',
-  range: 'range_m distance_m range distance dist range_mm distance_mm dist_m dist_mm range_cm distance_cm abstand',
+  range:
+    'range_m distance_m range distance dist range_mm distance_mm dist_m dist_mm range_cm distance_cm abstand entfernung entfernung_m entfernung_cm entfernung_mm',
   tag: 'tag_id tag tag_address source local_id',
   rss: 'rss_dbm rss rssi',
   rx: 'rx_dbm rx_power rx',

@@ -100,7 +100,11 @@ export function table_of(name: string, whole: string): Table {
   if (columns.every((c) => c !== '' && Number.isFinite(number_of(c, decimal))))
     throw new Error(`${name}: the first line has numbers; a header line with names is needed`);
   const twice = columns.find((c, i) => c !== '' && columns.indexOf(c) !== i);
-  if (twice !== undefined) throw new Error(`${name}: two columns have the name "${twice}"`);
+  if (twice !== undefined)
+    throw new Error(
+      `${name}: two columns have the name "${twice}"` +
+        (Number.isFinite(number_of(twice, decimal)) ? ', which is a number; a header line with names is needed' : ''),
+    );
   rows.forEach((row, i) => {
     // Spreadsheets leave empty cells at the end of a row.
     while (row.length > columns.length && row[row.length - 1] === '') row.pop();
