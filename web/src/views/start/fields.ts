@@ -71,9 +71,15 @@ export const NAMES: Readonly<Record<Field, string>> = {
     'alt_m height_m alt altitude height h altitude_m hoehe alt_msl alt_msl_m altitude_msl altitude_msl_m height_msl height_msl_m msl hmsl orthometric_height',
   separation:
     'geoid_separation geoid_separation_m geoid_sep geoidal_separation undulation undulation_m geoid_height geoid_height_m geoid_undulation',
-  x: 'x_m x e_m east east_m easting easting_m e rechtswert ostwert x_ecef_m ecef_x ecef_x_m e_baseline_m pe pe_m pos_e pos_e_m x_ned ned_x pos_ned_x pos_ned_0',
-  y: 'y_m y n_m north north_m northing northing_m n hochwert nordwert y_ecef_m ecef_y ecef_y_m n_baseline_m pn pn_m pos_n pos_n_m y_ned ned_y pos_ned_y pos_ned_1',
-  z: 'z_m z u_m up up_m z_ecef_m ecef_z ecef_z_m u_baseline_m pd pd_m pos_d pos_d_m down down_m z_ned ned_z pos_ned_z pos_ned_2',
+  x:
+    'x_m x e_m east east_m easting easting_m e rechtswert ostwert x_ecef_m ecef_x ecef_x_m e_baseline_m ' +
+    'pe pe_m pos_e pos_e_m x_ned ned_x pos_ned_x pos_ned_0',
+  y:
+    'y_m y n_m north north_m northing northing_m n hochwert nordwert y_ecef_m ecef_y ecef_y_m n_baseline_m ' +
+    'pn pn_m pos_n pos_n_m y_ned ned_y pos_ned_y pos_ned_1',
+  z:
+    'z_m z u_m up up_m z_ecef_m ecef_z ecef_z_m u_baseline_m ' +
+    'pd pd_m pos_d pos_d_m down down_m z_ned ned_z pos_ned_z pos_ned_2',
   fix: 'fix fix_type quality fix_quality gps_qual rtk q carrsoln status',
   sigma_h: 'sd_h_m sigma_h_m hacc h_acc sd_h',
   sigma_v: 'sd_v_m sigma_v_m vacc v_acc sd_v sdu_m sigma_u_m',
@@ -88,7 +94,8 @@ export const NAMES: Readonly<Record<Field, string>> = {
   qw: 'qw',
   anchor: 'anchor_id anchor anchor_address anchor_name remote remote_id dest destination anker',
   range:
-    'range_m distance_m range distance dist range_mm distance_mm dist_m dist_mm range_cm distance_cm abstand entfernung entfernung_m entfernung_cm entfernung_mm',
+    'range_m distance_m range distance dist range_mm distance_mm dist_m dist_mm range_cm distance_cm abstand ' +
+    'entfernung entfernung_m entfernung_cm entfernung_mm',
   tag: 'tag_id tag tag_address source local_id',
   rss: 'rss_dbm rss rssi',
   rx: 'rx_dbm rx_power rx',
