@@ -87,7 +87,7 @@ test('rows that came late for a flight that was sent go with the next sync, once
   await ok(field, `/api/v1/fixes?mission=${first}`, rows([{ t_us: start_us - 500_001, lat, lon, h_m, fix: 'fixed' }]));
   await exclude(field, first, '0x6a22');
   const { stdout, stderr } = await up();
-  assert.match(stderr, /simulated 7\": 43 rows stored/);
+  assert.match(stderr, /simulated 7": 43 rows stored/);
   assert.match(stdout, /flights: 1 sent, 0 already there/);
   const now = await ok(centre, `/api/v1/missions/${first}`);
   assert.deepEqual([now.n_ranges, now.n_fixes], [before.n_ranges + 40, before.n_fixes + 1]);
