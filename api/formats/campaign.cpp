@@ -2,14 +2,15 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cmath>
 #include <cstdio>
-#include <functional>
 #include <nlohmann/json.hpp>
+#include <set>
 
+#include "api/formats/binary_file.hpp"
 #include "api/formats/campaign_text.hpp"
 #include "api/formats/cells.hpp"
+#include "api/formats/class_words.hpp"
 #include "api/formats/column_names.hpp"
 #include "api/formats/csv_record.hpp"
 #include "api/formats/names_alike.hpp"
@@ -20,6 +21,7 @@
 #include "core/base/text.hpp"
 #include "core/base/to_wire.hpp"
 #include "core/ml/dataset.hpp"
+#include "core/ml/plausible.hpp"
 
 namespace anchord::api {
 namespace {
@@ -28,13 +30,9 @@ using namespace columns;
 constexpr std::size_t k_most_errors = 100;
 constexpr double k_furthest_m = row_limits::k_campaign_range_m.max;
 
-// Names of the hand-measured truth; a column of measured ranges may be called distance_m only where another
-// column is the truth.
-const Names k_site_name{"site", "setting", "setup_id", "setup", "placement", "measurement_point"};
-const Names k_environment{"environment", "env", "place", "room"};
-const Names k_campaign_truth{"true_distance_m", "true_range_m", "truth_m", "laser_m"};
-const Names k_measured{"range_m", "measured_range_m", "range"};
-const Names k_measured_mm{"range_mm", "measured_range_mm"};
+bool has_unit(std::string_view name) {
+  return name.ends_with("_m") || name.ends_with("_mm") || name.ends_with("_cm");
+}
 
 std::string_view trimmed(std::string_view text) {
   while (!text.empty() && (text.front() == ' ' || text.front() == '\t')) text.remove_prefix(1);
@@ -50,6 +48,13 @@ using Row = std::map<std::string, std::string, std::less<>>;
 const Row::value_type* cell(const Row& row, const Names& names) {
   for (const auto name : names)
     if (const auto at = row.find(name); at != row.end() && !at->second.empty()) return &*at;
+  return nullptr;
+}
+
+// The same, of those that say something: "n/a" in one column leaves the next.
+const Row::value_type* telling_cell(const Row& row, const Names& names) {
+  for (const auto name : names)
+    if (const auto at = row.find(name); at != row.end() && !says_nothing(at->second)) return &*at;
   return nullptr;
 }
 
@@ -80,10 +85,12 @@ std::string in_quotes(std::string_view text) { return '"' + to_utf8(text, 40) + 
 
 class Importer {
  public:
-  explicit Importer(const CampaignOptions& options) : options_{options}, defaults_{options.defaults} {}
+  explicit Importer(const CampaignOptions& options)
+      : options_{options}, defaults_{options.defaults}, classes_{options.los_value} {}
 
   Result<CampaignImport> run(std::string_view text) {
     if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);
+    if (const auto what = binary_file(text); !what.empty()) return make_error(Errc::bad_frame, what);
     if (text.find('\0') != std::string_view::npos)
       return make_error(Errc::bad_frame,
                         "no text: it has bytes of zero in it (UTF-16 without its mark?); save it as UTF-8");
@@ -102,6 +109,12 @@ class Importer {
     }
     if (out_.campaign.measurements.empty() && out_.report.lines == 0)
       return make_error(Errc::bad_frame, "no measurement in the file");
+    if (const auto why = unit_conflict(ratios_, spelled(ratio_range_), spelled(ratio_truth_)); !why.empty())
+      return make_error(Errc::invalid_argument, why);
+    if (!classes_.met())
+      return make_error(Errc::invalid_argument,
+                        "no row has the class " + in_quotes(classes_.los_value()) +
+                            " that is said to mean LOS in a column that does not say it by its name");
     finish();
     return std::move(out_);
   }
@@ -143,7 +156,9 @@ class Importer {
     std::string value{trimmed(text.substr(at + 1))};
     if (const auto parsed = cell_number(value, true); parsed && value.find(',') != std::string::npos)
       value[value.find(',')] = '.';
-    const Row row{{std::string{trimmed(text.substr(0, at))}, std::move(value)}};
+    const auto key = trimmed(text.substr(0, at));
+    const auto known = known_name(key);
+    const Row row{{std::string{known.empty() ? key : known}, std::move(value)}};
     Fault fault;
     auto changed = site_of(row, defaults_, fault);
     if (fault.reason) return refuse(number_of_line, std::move(fault));
@@ -172,22 +187,35 @@ class Importer {
     if (cells.size() != header_.size())
       return refuse(at, {k_unreadable, {}, wrong_cell_count(cells.size(), header_.size(), separator_)});
     Row row;
-    for (std::size_t c = 0; c < cells.size(); ++c) row.emplace(header_[c], cells[c]);
+    for (std::size_t c = 0; c < cells.size(); ++c)
+      if (!known_[c].empty()) row.emplace(known_[c], cells[c]);
     take_row(row, at);
   }
 
-  std::optional<Error> fault_of_header(std::size_t at) const {
+  std::optional<Error> fault_of_header(std::size_t at) {
     const std::string line = "line " + std::to_string(at) + ": ";
-    for (auto name = header_.begin(); name != header_.end(); ++name)
+    for (auto name = header_.begin(); name != header_.end(); ++name) {
+      const auto known = known_name(*name);
+      known_.push_back(known);
+      if (known.empty()) {
+        note_unused(*name);
+      } else if (const auto [twin, fresh] = spelling_.try_emplace(std::string(known), *name); !fresh) {
+        return make_error(Errc::invalid_argument,
+                          line +
+                              (twin->second == *name ? "two columns are named " + in_quotes(*name)
+                                                     : "columns " + in_quotes(twin->second) + " and " +
+                                                           in_quotes(*name) + " are one name here") +
+                              ": rename or remove one");
+      }
       if (!name->empty() && std::find(header_.begin(), name, *name) != name)
         return make_error(Errc::invalid_argument,
                           line + "two columns are named " + in_quotes(*name) + ": rename or remove one");
+    }
     const auto has = [this](const Names& names) {
       return std::ranges::any_of(
-          names, [this](auto name) { return std::ranges::find(header_, name) != header_.end(); });
+          names, [this](auto name) { return std::ranges::find(known_, name) != known_.end(); });
     };
-    if (has(k_measured) || has(k_measured_mm) || (has(k_campaign_truth) && has({"distance_m", "distance"})))
-      return std::nullopt;
+    if (has(k_range) || (has(k_truth) && has(k_distance))) return std::nullopt;
     std::string columns;
     for (const auto& name : header_) columns += (columns.empty() ? "" : ", ") + in_quotes(name);
     return make_error(
@@ -195,7 +223,8 @@ class Importer {
         line + "no column of measured ranges (range_m, or range_mm for millimetres); read with \"" +
             (separator_ == '\t' ? std::string("tab") : std::string(1, separator_)) +
             "\" between cells, the columns are " + columns.substr(0, 600) +
-            ": name the columns in the first line, or give a .txt of time in ms, distance in mm "
+            ": is there a header? Name the columns in the first line, or give a .txt of time in ms, distance "
+            "in mm "
             "and RSS in dBm");
   }
 
@@ -214,7 +243,7 @@ class Importer {
           const std::string text = of.is_boolean()  ? (of.get<bool>() ? "1" : "0")
                                    : of.is_string() ? of.get<std::string>()
                                                     : to_wire(of);
-          row.insert_or_assign(name == "distance_m" ? "true_distance_m" : name, text);
+          row.insert_or_assign(name == "distance_m" ? "true_distance_m" : key_of(name), text);
         }
       } else if (key == "features" || key == "predicted") {
         continue;  // computed from what else the line has
@@ -223,12 +252,15 @@ class Importer {
         cir = read_cir(value, "/cir", errors);
         if (!errors.empty())
           return refuse(at, {k_impossible, key, errors.front().pointer + " " + errors.front().detail});
+      } else if (key == "cir") {
+        return refuse(at, {k_impossible, key,
+                           "cir is no object of n, first_path_idx, dt_ps and b64 as a range has it"});
       } else if (value.is_boolean())
-        row.emplace(key, value.get<bool>() ? "1" : "0");
+        row.emplace(key_of(key), value.get<bool>() ? "1" : "0");
       else if (value.is_string())
-        row.emplace(key, value.get<std::string>());
+        row.emplace(key_of(key), value.get<std::string>());
       else if (value.is_number())
-        row.emplace(key, to_wire(value));
+        row.emplace(key_of(key), to_wire(value));
       else
         return refuse(at, {k_impossible, key, key + " is neither a number nor text"});
     }
@@ -261,34 +293,39 @@ class Importer {
       if (!parsed)
         fault.set(k_impossible, found->first, not_a_number(*found));
       else if (*parsed < low || *parsed > high)
-        fault.set(k_impossible, found->first, found->first + " impossible: " + in_quotes(found->second));
+        fault.set(k_impossible, found->first,
+                  spelled(found->first) + " impossible: " + in_quotes(found->second));
       return parsed;
     };
-    const auto range = [&](const Names& names, double metres) -> std::optional<double> {
-      const auto* where = cell(row, names);
+    const auto range = [&](const Names& names) -> std::optional<double> {
+      const auto* where = telling_cell(row, names);
+      if (!where) return std::nullopt;
       // A name without a unit is metres, and no radio measures so many.
-      const bool unit = metres != 1 || !where || where->first.ends_with("_m");
-      const auto found = value(names, 0, unit ? k_furthest_m / metres : row_limits::k_distance_m.max);
-      if (where) range_column = where->first;
+      const double metres = metres_per_unit(where->first).value_or(1);
+      range_column = where->first;
+      const auto found = value({where->first}, 0,
+                               has_unit(where->first) ? k_furthest_m / metres : row_limits::k_distance_m.max);
       return found ? std::optional{*found * metres} : std::nullopt;
     };
-    auto range_m = range(k_measured, 1);
-    if (!range_m) range_m = range(k_measured_mm, 1e-3);
-    // "distance_m" is the measured one where another column holds the truth.
-    if (!range_m && find(row, k_campaign_truth)) range_m = range({"distance_m", "distance"}, 1);
-    for (const auto& names : {k_measured, k_measured_mm})
-      for (const auto name : names)
-        if (range_column.empty() && row.contains(name)) range_column = name;
-    if (!range_m) fault.set(k_missing, range_column, "no measured range (range_m, or range_mm)");
+    const auto has_name = [&row](auto name) { return row.contains(name); };
+    auto range_m = range(k_range);
+    // A distance is the measured one where another column holds the truth and none the range.
+    if (!range_m && std::ranges::none_of(k_range, has_name) && find(row, k_truth))
+      range_m = range(k_distance);
+    if (const auto named = std::ranges::find_if(k_range, has_name);
+        range_column.empty() && named != k_range.end())
+      range_column = *named;
+    if (range_m && site.distance_m) note_ratio(row, range_column, *range_m / *site.distance_m);
+    if (!range_m) fault.set(k_missing, range_column, "no measured range (range_m, range_cm or range_mm)");
     constexpr double k_any = 1e300;
     const auto bounded = [&](const Names& names, const row_limits::Bounds& bounds) {
       return value(names, bounds.min, bounds.max);
     };
-    m.t_s = value({"t_s", "unix_s", "time_s"}, -k_any, k_any);
+    m.t_s = value(k_seconds, -k_any, k_any);
     if (!m.t_s)
-      if (const auto ms = value({"t_ms", "timestamp_ms"}, -k_any, k_any)) m.t_s = *ms / 1000;
+      if (const auto ms = value(k_milliseconds, -k_any, k_any)) m.t_s = *ms / 1000;
     if (!m.t_s)
-      if (const auto us = value({"t_us"}, -k_any, k_any)) m.t_s = *us / 1e6;
+      if (const auto us = value(k_microseconds, -k_any, k_any)) m.t_s = *us / 1e6;
     m.rx_dbm = bounded(k_rx, row_limits::k_dbm);
     m.fp_dbm = bounded(k_fp, row_limits::k_dbm);
     m.fp_amp1 = bounded(k_f1, row_limits::k_register);
@@ -306,14 +343,14 @@ class Importer {
   }
 
   std::optional<double> number(std::string_view text) const { return cell_number(text, separator_ != ','); }
-  static std::string not_a_number(const Row::value_type& where) {
-    return where.first + " is not a number: " + in_quotes(where.second) +
+  std::string not_a_number(const Row::value_type& where) const {
+    return spelled(where.first) + " is not a number: " + in_quotes(where.second) +
            (where.second.find(',') == std::string::npos
                 ? ""
                 : " (with decimal commas, separate the cells by semicolons or tabs; write no thousands)");
   }
 
-  CampaignSite site_of(const Row& row, CampaignSite site, Fault& fault) const {
+  CampaignSite site_of(const Row& row, CampaignSite site, Fault& fault) {
     const auto text = [&](const Names& names, std::string& out) {
       auto found = find(row, names);
       if (!found) return;
@@ -323,48 +360,88 @@ class Importer {
         found->erase(0, 1);
       out = std::move(*found);
     };
-    const auto value = [&](const Names& names, double low, double high, std::optional<double>& out) {
-      const auto* found = cell(row, names);
+    const auto value = [&](const Names& names, double low, double high, std::optional<double>& out,
+                           bool length = false) {
+      const auto* found = length ? telling_cell(row, names) : cell(row, names);
       if (!found || says_nothing(found->second)) return;
-      const auto parsed = number(found->second);
+      auto parsed = number(found->second);
+      if (parsed && length) *parsed *= metres_per_unit(found->first).value_or(1);
       if (!parsed || *parsed < low || *parsed > high)
         return fault.set(k_impossible, found->first,
-                         found->first + " impossible: " + in_quotes(found->second));
+                         spelled(found->first) + " impossible: " + in_quotes(found->second));
       out = parsed;
     };
     constexpr auto truth_m = row_limits::k_campaign_truth_m;
     text(k_site_name, site.name);
     text(k_environment, site.environment);
-    text({"material"}, site.material);
-    value(k_campaign_truth, truth_m.min, truth_m.max, site.distance_m);
+    text(k_material, site.material);
     // In a .txt header and beside a range column, distance_m is the truth.
-    if (find(row, k_measured) || find(row, k_measured_mm) || row.size() == 1)
-      value({"distance_m"}, truth_m.min, truth_m.max, site.distance_m);
-    value({"heading_deg"}, -360, 720, site.heading_deg);
-    value({"height_m", "height_diff_m", "height_difference_m"}, -1000, 1000, site.height_m);
-    value({"thickness_m"}, 0, 100, site.thickness_m);
-    value({"truth_sd_m", "truth_sigma_m", "truth_accuracy_m"}, 0, 100, site.truth_sd_m);
-    const auto truth_of = [](const std::string& word) -> std::optional<bool> {
-      if (word == "1" || word == "true" || word == "LOS" || word == "los") return true;
-      if (word == "0" || word == "false" || word == "NLOS" || word == "nlos") return false;
-      return std::nullopt;
-    };
-    const auto label = [&](const Names& names, bool means_los) {
-      const auto* cell_of = cell(row, names);
-      if (!cell_of) return;
-      const auto* found = &cell_of->second;
-      const auto parsed = truth_of(*found);
-      if (!parsed)
-        fault.set(k_impossible, cell_of->first,
-                  cell_of->first + " is neither LOS nor NLOS: " + in_quotes(*found));
-      // The words say themselves what they are; only 0 and 1 depend on the column's name.
-      const bool word = found->size() > 1 && (found->front() == 'L' || found->front() == 'l' ||
-                                              found->front() == 'N' || found->front() == 'n');
-      if (parsed) site.los = word || means_los ? *parsed : !*parsed;
-    };
-    label({"los", "is_los", "label", "class"}, true);
-    label({"nlos", "is_nlos"}, false);
+    if (telling_cell(row, k_truth))
+      value(k_truth, truth_m.min, truth_m.max, site.distance_m, true);
+    else if (find(row, k_range) || row.size() == 1)
+      value(k_distance_truth, truth_m.min, truth_m.max, site.distance_m, true);
+    value(k_heading, -360, 720, site.heading_deg);
+    value(k_site_height, -1000, 1000, site.height_m);
+    value(k_thickness, 0, 100, site.thickness_m);
+    value(k_truth_sd, 0, 100, site.truth_sd_m);
+    take_class(row, site, fault);
     return site;
+  }
+
+  /// The first column that can be read counts, those first that say by their names what 0 and 1 mean.
+  void take_class(const Row& row, CampaignSite& site, Fault& fault) {
+    using enum ClassReader::Said;
+    Fault unreadable_one;
+    std::optional<bool> said;
+    for (const auto name : k_label) {
+      const auto found = row.find(name);
+      if (found == row.end() || (said && !ClassReader::says_it(name))) continue;
+      const auto read = classes_.read(spelled(name), found->second);
+      switch (read) {
+        case nothing:
+          break;
+        case untold:
+          fatal_ = make_error(Errc::invalid_argument, untold_class(spelled(name), found->second));
+          return;
+        case unreadable:
+          unreadable_one.set(k_impossible, name,
+                             spelled(name) + " is neither LOS nor NLOS: " + in_quotes(found->second));
+          break;
+        case los:
+        case nlos:
+          if (said && *said != (read == los))
+            return fault.set(k_impossible, name, spelled(name) + " contradicts another column of the class");
+          said = read == los;
+      }
+    }
+    if (said)
+      site.los = said;
+    else if (unreadable_one.reason)
+      fault.set(unreadable_one.reason, unreadable_one.column, unreadable_one.detail);
+  }
+
+  /// The key by which a line is read, and a note where nothing is taken from it.
+  std::string key_of(const std::string& key) {
+    const auto known = known_name(key);
+    if (known.empty()) note_unused(key);
+    if (!known.empty() && known != key) spelling_.try_emplace(std::string(known), key);
+    return known.empty() ? key : std::string(known);
+  }
+  std::string spelled(std::string_view known) const {
+    const auto at = spelling_.find(known);
+    return at == spelling_.end() ? std::string(known) : at->second;
+  }
+  void note_unused(const std::string& name) {
+    if (!name.empty() && name != "id" && name != "seq" && unused_.insert(name).second)
+      out_.report.unused.push_back(name);
+  }
+  void note_ratio(const Row& row, const std::string& range_column, double ratio) {
+    ratios_.add(ratio, 1);
+    if (ratios_.values.size() != 1) return;
+    ratio_range_ = range_column;
+    const auto* truth = telling_cell(row, k_truth);
+    if (!truth) truth = telling_cell(row, k_distance_truth);
+    ratio_truth_ = truth ? truth->first : "the true distance that was given";
   }
 
   void keep(const CampaignSite& site, CampaignMeasurement m, std::size_t at, const std::string& column = {}) {
@@ -372,7 +449,8 @@ class Importer {
     m.line = at;
     auto& report = out_.report.sites[m.site];
     if (m.range_m == 0) {  // the radio's way to say that there was no answer (5.2)
-      count("zero range", {at, column, "the radio reports a range of zero when an anchor does not answer"});
+      count("zero range",
+            {at, spelled(column), "the radio reports a range of zero when an anchor does not answer"});
       ++report.zero;
       return;
     }
@@ -407,7 +485,7 @@ class Importer {
   }
 
   void refuse(std::size_t at, Fault fault) {
-    CampaignLineError error{at, std::move(fault.column), std::move(fault.detail)};
+    CampaignLineError error{at, spelled(fault.column), std::move(fault.detail)};
     if (out_.report.errors.size() < k_most_errors) out_.report.errors.push_back(error);
     count(fault.reason, std::move(error));
   }
@@ -453,6 +531,17 @@ class Importer {
     }
     out_.report.warnings = names_alike("environments", environments);
     for (auto& warning : names_alike("settings", sites)) out_.report.warnings.push_back(std::move(warning));
+    std::size_t n = 0, implausible = 0;
+    for (const auto& m : measurements) {
+      const auto& truth = out_.campaign.sites[m.site].distance_m;
+      if (!truth) continue;
+      ++n;
+      if (!ml::plausible_range(m.range_m, m.range_m - *truth)) ++implausible;
+    }
+    if (auto odd = implausible_ranges(implausible, n); !odd.empty())
+      out_.report.oddities.push_back(std::move(odd));
+    out_.report.unused = in_runs(out_.report.unused);
+    out_.report.classes = classes_.taken();
   }
 
   static void summarise(std::vector<double>& values, CampaignReport::Site& out) {
@@ -469,7 +558,13 @@ class Importer {
 
   const CampaignOptions& options_;
   CampaignSite defaults_;
+  ClassReader classes_;
   std::vector<std::string> header_;
+  std::vector<std::string_view> known_;                         // of the header; empty: no name of the tables
+  std::map<std::string, std::string, std::less<>> spelling_{};  // of the source, by known name
+  std::set<std::string> unused_{};
+  Ratios ratios_{};
+  std::string ratio_range_{}, ratio_truth_{};
   char separator_{','};
   bool separator_told_{false};
   std::size_t last_{static_cast<std::size_t>(-1)};
@@ -483,91 +578,6 @@ Result<CampaignImport> import_campaign(std::string_view text, const CampaignOpti
   const bool wide = text.starts_with("\xFF\xFE") || text.starts_with("\xFE\xFF");
   const std::string narrow = wide ? decoded(text) : std::string();
   return Importer{options}.run(wide ? std::string_view(narrow) : text);
-}
-
-LabelledTable table_of(const Campaign& campaign) {
-  LabelledTable out;
-  out.grouping = Grouping::column;
-  out.group_by = "environment";
-  out.placement_by = "site";
-  std::map<std::string, std::uint32_t> places;
-  for (const auto& m : campaign.measurements) {
-    const auto& site = campaign.sites[m.site];
-    const std::string place =
-        site.environment.empty() ? "site " + std::to_string(m.site + 1) : site.environment;
-    const auto [at, fresh] = places.try_emplace(place, static_cast<std::uint32_t>(places.size()));
-    if (fresh) out.group_names.push_back(place);
-    nlos::DiagnosticSample s;
-    s.range_m = m.range_m;
-    s.rx_dbm = m.rx_dbm;
-    s.fp_dbm = m.fp_dbm;
-    s.fp_amp1 = m.fp_amp1;
-    s.fp_amp2 = m.fp_amp2;
-    s.fp_amp3 = m.fp_amp3;
-    s.cir_power = m.cir_power;
-    s.preamble_count = m.preamble_count;
-    s.std_noise = m.std_noise;
-    s.max_noise = m.max_noise;
-    s.fp_index = m.fp_index;
-    s.height_difference_m = site.height_m;
-    s.heading_deg = site.heading_deg;
-    out.features.push_back(nlos::compute_features(s));
-    out.range_m.push_back(m.range_m);
-    out.true_range_m.push_back(site.distance_m);
-    out.los.push_back(site.los);
-    out.group.push_back(at->second);
-    out.placement.push_back(static_cast<std::uint32_t>(m.site));
-    if (site.los) out.label_column = "los";
-    if (site.distance_m) out.truth_column = "true_distance_m";
-  }
-  out.rows_read = out.rows();
-  return out;
-}
-
-std::string campaign_csv(const Campaign& campaign) {
-  std::string out =
-      "site,environment,material,true_distance_m,heading_deg,height_m,thickness_m,los,truth_sd_m,t_s,range_m,"
-      "rx_dbm,fp_dbm,fp_amp1,fp_amp2,fp_amp3,cir_pwr,rxpacc,std_noise,max_noise,fp_index\n";
-  const auto put = [&out](std::optional<double> value) {
-    out += ',';
-    if (!value) return;
-    std::array<char, 32> text{};
-    const auto end = std::to_chars(text.data(), text.data() + text.size(), *value).ptr;
-    out.append(text.data(), end);
-  };
-  const auto word = [&out](std::string text) {  // commas would tear the line
-    std::replace(text.begin(), text.end(), ',', ';');
-    std::replace(text.begin(), text.end(), '\n', ' ');
-    out += text;
-  };
-  for (const auto& m : campaign.measurements) {
-    const auto& s = campaign.sites[m.site];
-    word(s.name);
-    out += ',';
-    word(s.environment);
-    out += ',';
-    word(s.material);
-    put(s.distance_m);
-    put(s.heading_deg);
-    put(s.height_m);
-    put(s.thickness_m);
-    out += s.los ? (*s.los ? ",1" : ",0") : ",";
-    put(s.truth_sd_m);
-    put(m.t_s);
-    put(m.range_m);
-    put(m.rx_dbm);
-    put(m.fp_dbm);
-    put(m.fp_amp1);
-    put(m.fp_amp2);
-    put(m.fp_amp3);
-    put(m.cir_power);
-    put(m.preamble_count);
-    put(m.std_noise);
-    put(m.max_noise);
-    put(m.fp_index);
-    out += '\n';
-  }
-  return out;
 }
 
 }  // namespace anchord::api

@@ -23,6 +23,7 @@ inline constexpr auto k_campaign_format_words =
 struct CampaignOptions {
   CampaignFormat format{CampaignFormat::detect};
   CampaignSite defaults{};      ///< truth of rows that name none: how a .txt says what it is of
+  std::string los_value{};      ///< what means LOS in a column of a class that does not say it by its name
   bool filter{true};            ///< drop outliers of each site (6.2.1); zero ranges are always faults
   double outlier_mads{8};       ///< of 1.4826 MAD off the site's median range, from 5 measurements on
   double outlier_floor_m{0.5};  ///< and never nearer than this: a quiet site has a tiny MAD
@@ -56,8 +57,11 @@ struct CampaignReport {
     std::size_t kept{}, zero{}, outliers{};
     double median_m{}, sd_m{};
   };
-  std::vector<Site> sites{};            ///< as Campaign::sites
-  std::vector<std::string> warnings{};  ///< names that differ in capitals or blanks alone
+  std::vector<Site> sites{};                     ///< as Campaign::sites
+  std::vector<std::string> warnings{};           ///< names that differ in capitals or blanks alone
+  std::vector<std::string> oddities{};           ///< ranges that are no metres
+  std::vector<std::string> unused{};             ///< columns and keys that nothing was taken from
+  std::map<std::string, std::string> classes{};  ///< column of the class -> the value that was taken for LOS
 };
 
 struct CampaignImport {
@@ -67,8 +71,8 @@ struct CampaignImport {
 
 /// Bad lines never sink good ones: they are counted and named.
 /// text    UTF-8, or UTF-16 with its mark; see docs/learning.md for the columns and for the `# key = value`
-/// lines of a .txt errors  bad_frame (no header, no line that can be read), invalid_argument (no range
-/// column, two of one name)
+/// lines of a .txt errors  bad_frame (no text, no header, no line that can be read), invalid_argument (no
+/// range column, two of one name, a class that does not say what is LOS, ranges and truth of two units)
 Result<CampaignImport> import_campaign(std::string_view text, const CampaignOptions& options = {});
 
 /// The campaign as a table of labelled rangings: features computed, a place per environment, a placement per

@@ -5,7 +5,10 @@
 #include <set>
 #include <unordered_map>
 
+#include "api/formats/binary_file.hpp"
 #include "api/formats/cells.hpp"
+#include "api/formats/cir_table.hpp"
+#include "api/formats/class_words.hpp"
 #include "api/formats/column_names.hpp"
 #include "api/formats/csv_record.hpp"
 #include "api/formats/gzip_lines.hpp"
@@ -23,8 +26,8 @@ const Names k_group{"group",    "env",     "environment", "place",   "room",
                     "campaign", "session", "setup",       "tag_pos", "anchor_height_m"};
 const Names k_placement{"setup_id", "placement", "setup", "setting", "measurement_point"};
 const Names k_time{"t_s", "unix_s", "t_us", "time_s", "t_ms"};
-const Names k_joins{"setup", "idx", "seq"};
-constexpr std::size_t k_none = static_cast<std::size_t>(-1);
+constexpr std::size_t k_no_column = static_cast<std::size_t>(-1);
+constexpr std::size_t k_many_unused = 32;
 constexpr std::size_t k_time_blocks = 10, k_times_looked_at = 1000;
 constexpr double k_nan = std::numeric_limits<double>::quiet_NaN();
 
@@ -38,39 +41,14 @@ double number_or_nan(std::string_view cell, bool decimal_comma = false) {
 
 std::optional<double> finite(double value) { return std::isnan(value) ? std::nullopt : std::optional{value}; }
 
-/// "FP Power [dBm]" and "fp_power_dbm" are one name.
-std::string plain_name(std::string_view name) {
-  std::string out;
-  for (const char c : name) {
-    if (c >= 'A' && c <= 'Z')
-      out += static_cast<char>(c - 'A' + 'a');
-    else if ((c >= 'a' && c <= 'z') || (c >= '0' && c <= '9'))
-      out += c;
-  }
-  return out;
-}
-
-/// Metres of one unit of a column, by the end of its name.
-double metres_per_unit(std::string_view name) {
-  const auto plain = plain_name(name);
-  return plain.ends_with("mm") ? 1e-3 : plain.ends_with("cm") ? 1e-2 : 1.0;
-}
-
 struct Header {
   std::vector<std::string> names;
   std::size_t of(std::string_view name) const {
     const auto at = std::find(names.begin(), names.end(), name);
-    return at == names.end() ? k_none : static_cast<std::size_t>(at - names.begin());
+    return at == names.end() ? k_no_column : static_cast<std::size_t>(at - names.begin());
   }
   std::size_t first(const Names& candidates) const {
-    for (const auto name : candidates)
-      if (const auto at = of(name); at != k_none) return at;
-    for (const auto name : candidates) {
-      const auto wanted = plain_name(name);
-      for (std::size_t i = 0; i < names.size(); ++i)
-        if (plain_name(names[i]) == wanted) return i;
-    }
-    return k_none;
+    return first_of(names, candidates).value_or(k_no_column);
   }
 };
 
@@ -88,65 +66,10 @@ class Ids {
   std::vector<std::string> names_;
 };
 
-std::string joined(const std::vector<std::string_view>& cells, std::span<const std::size_t> columns) {
-  std::string out;
-  for (const auto c : columns) out.append(out.empty() ? "" : "/").append(cells[c]);
-  return out;
-}
-
-/// Magnitudes by their row's key, until the ranging says where its first path is.
-struct CirTable {
-  std::vector<std::string> join_names;
-  std::unordered_map<std::string, std::vector<float>> taps;
-};
-
-Result<CirTable> read_cir(const std::filesystem::path& path) {
-  BOOST_OUTCOME_TRY(auto lines, GzipLines::open(path));
-  CirTable out;
-  std::vector<std::size_t> joins;
-  std::vector<std::pair<std::size_t, std::size_t>> taps;
-  CsvRecord record;
-  std::vector<float> magnitude;
-  std::size_t width = 0;
-  for (std::string_view line;;) {
-    BOOST_OUTCOME_TRY(const bool more, lines.next(line));
-    if (!more) break;
-    if (const auto read = record.read(line); !read)
-      return at_line(path.string(), lines, read.error().message);
-    const auto& cells = record.cells();
-    if (width == 0) {
-      width = cells.size();
-      for (std::size_t c = 0; c < width; ++c) {
-        if (std::find(k_joins.begin(), k_joins.end(), cells[c]) != k_joins.end()) {
-          joins.push_back(c);
-          out.join_names.emplace_back(cells[c]);
-        } else if (cells[c].size() > 1 && cells[c][0] == 'm' &&
-                   !std::isnan(number_or_nan(cells[c].substr(1))))
-          taps.emplace_back(static_cast<std::size_t>(number_or_nan(cells[c].substr(1))), c);
-      }
-      std::sort(taps.begin(), taps.end());
-      if (joins.empty() || taps.size() < 32)
-        return make_error(
-            Errc::invalid_argument,
-            path.string() + ": a CIR table needs a join column (setup, idx, seq) and taps m0, m1, ...");
-      continue;
-    }
-    if (cells.size() != width)
-      return at_line(path.string(), lines,
-                     std::to_string(cells.size()) + " cells, the header has " + std::to_string(width));
-    magnitude.clear();
-    for (const auto& [tap, column] : taps)
-      magnitude.push_back(static_cast<float>(number_or_nan(cells[column])));
-    if (std::any_of(magnitude.begin(), magnitude.end(), [](float v) { return std::isnan(v); })) continue;
-    out.taps.emplace(joined(cells, joins), magnitude);
-  }
-  return out;
-}
-
 class TableReader {
  public:
   TableReader(const TableOptions& options, bool several_files)
-      : options_{options}, several_files_{several_files} {}
+      : options_{options}, several_files_{several_files}, classes_{options.los_value, true} {}
 
   Result<void> read(const std::filesystem::path& path, const CirTable* cir) {
     BOOST_OUTCOME_TRY(auto lines, GzipLines::open(path));
@@ -154,6 +77,8 @@ class TableReader {
     std::string_view line;
     BOOST_OUTCOME_TRY(const bool any, lines.next(line));
     if (!any) return make_error(Errc::bad_frame, file_ + ": empty file, a header line is needed");
+    if (const auto what = binary_file(line); !what.empty())
+      return make_error(Errc::bad_frame, file_ + ": " + what);
     if (line.starts_with("\xEF\xBB\xBF")) line.remove_prefix(3);
     if (line.starts_with("\xFF\xFE") || line.starts_with("\xFE\xFF") ||
         line.find('\0') != std::string_view::npos)
@@ -176,7 +101,7 @@ class TableReader {
     if (cir) {
       for (const auto& name : cir->join_names) {
         joins.push_back(header_.of(name));
-        if (joins.back() == k_none)
+        if (joins.back() == k_no_column)
           return make_error(Errc::not_found,
                             file_ + ": the CIR table is joined by column " + name + ", which does not exist");
       }
@@ -198,15 +123,26 @@ class TableReader {
         drop("no CIR in the CIR table", lines.line_number());
       else
         take_row(cells, lines.line_number(), taps);
+      if (fatal_) return *fatal_;
     }
     return boost::outcome_v2::success();
   }
 
   Result<LabelledTable> finish() {
+    if (range_ != k_no_column && truth_ != k_no_column)
+      if (const auto why = unit_conflict(ratios_, header_.names[range_], header_.names[truth_]); !why.empty())
+        return make_error(Errc::invalid_argument, file_ + ": " + why);
+    if (out_.rows() == 0 && label_ != k_no_column && !unreadable_class_.empty() && options_.los_value.empty())
+      return make_error(Errc::invalid_argument,
+                        file_ + ": " + untold_class(header_.names[label_], unreadable_class_));
     if (out_.rows() == 0)
       return make_error(Errc::too_few_observations,
                         file_ + ": no usable row among " + std::to_string(out_.rows_read));
-    BOOST_OUTCOME_TRY(map_labels());
+    if (!classes_.met())
+      return make_error(Errc::invalid_argument, file_ + ": no row of column " + out_.label_column + " is \"" +
+                                                    options_.los_value + "\"");
+    if (const auto at = classes_.taken().find(out_.label_column); at != classes_.taken().end())
+      out_.los_value = at->second;
     look_for_oddities();
     if (out_.grouping == Grouping::time_block) {
       for (std::size_t i = 0; i < out_.rows(); ++i)
@@ -222,7 +158,7 @@ class TableReader {
  private:
   Result<std::size_t> column(const std::string& name) const {
     const auto at = header_.of(name);
-    if (at == k_none)
+    if (at == k_no_column)
       return make_error(Errc::not_found, file_ + ": no column " + name + "; the columns are " + columns());
     return at;
   }
@@ -243,11 +179,12 @@ class TableReader {
       return follow_header(std::move(fresh));
     }
     header_ = std::move(fresh);
-    range_ = header_.first(k_range);
+    const bool has_range = header_.first(k_range) != k_no_column;
+    range_ = has_range ? header_.first(k_range) : header_.first(k_distance);
     if (!options_.range.empty()) {
       BOOST_OUTCOME_TRY(range_, column(options_.range));
     }
-    if (range_ == k_none && (truth_given() || no_levels()))
+    if (range_ == k_no_column && (truth_given() || no_levels()))
       return make_error(Errc::not_found,
                         file_ +
                             ": no column of measured ranges (range_m, distance_m): name it with --range; "
@@ -258,11 +195,17 @@ class TableReader {
       BOOST_OUTCOME_TRY(label_, column(options_.label));
     }
     truth_ = header_.first(k_truth);
+    if (truth_ == k_no_column && has_range && options_.range.empty())
+      truth_ = header_.first(k_distance_truth);
     if (!options_.truth.empty()) {
       BOOST_OUTCOME_TRY(truth_, column(options_.truth));
     }
-    if (label_ != k_none) out_.label_column = header_.names[label_];
-    if (truth_ != k_none) out_.truth_column = header_.names[truth_];
+    for (const auto c : {range_, truth_})
+      if (c != k_no_column && !metres_per_unit(header_.names[c]))
+        return make_error(Errc::invalid_argument, file_ + ": column " + header_.names[c] +
+                                                      " is in a unit that is not read: convert it to metres");
+    if (label_ != k_no_column) out_.label_column = header_.names[label_];
+    if (truth_ != k_no_column) out_.truth_column = header_.names[truth_];
     BOOST_OUTCOME_TRY(choose_groups());
     BOOST_OUTCOME_TRY(choose_placements());
     out_.raw_names = header_.names;
@@ -288,6 +231,16 @@ class TableReader {
     const auto used = used_columns();
     for (std::size_t c = 0; c < header_.names.size(); ++c)
       if (!used.contains(c) && !header_.names[c].empty()) out_.unused.push_back(header_.names[c]);
+    // A feature is looked up by its own name: runs are of impulse responses, which only --cir brings.
+    if (out_.unused.size() > k_many_unused) {
+      const auto runs = in_runs(out_.unused);
+      for (const auto& one : runs)
+        if (bare_name(one).starts_with("cir") && one.ends_with(" columns)"))
+          out_.warnings.push_back(one +
+                                  " are impulse responses in the table and are not used: --cir takes them "
+                                  "from a second one");
+      out_.unused = runs;
+    }
   }
 
   /// Of two columns of one name nobody knows which is meant: one that is used is refused, others are told.
@@ -307,7 +260,7 @@ class TableReader {
   }
 
   void look_for_oddities() {
-    if (const auto at = header_.first(k_time); at != k_none) {
+    if (const auto at = header_.first(k_time); at != k_no_column) {
       const auto odd = time_unit_warning(header_.names[at], times_);
       if (!odd.empty()) out_.warnings.push_back(odd);
     }
@@ -320,11 +273,7 @@ class TableReader {
       ++n;
       if (!ml::plausible_range(out_.range_m[i], out_.range_m[i] - *out_.true_range_m[i])) ++implausible;
     }
-    if (20 * implausible > n)
-      out_.warnings.push_back(
-          std::to_string(implausible) + " of " + std::to_string(n) +
-          " measured ranges are more than twice or less than half of the true one, or farther "
-          "than a radio reaches: are both in metres? No server promotes a model of them");
+    if (auto odd = implausible_ranges(implausible, n); !odd.empty()) out_.warnings.push_back(std::move(odd));
   }
 
   // A later file may have its columns in another order, lack some that are no one's role, and have others.
@@ -335,7 +284,7 @@ class TableReader {
     for (auto& c : group_columns_) roles.push_back(&c);
     for (auto& c : placement_columns_) roles.push_back(&c);
     for (auto* role : roles) {
-      if (*role == k_none) continue;
+      if (*role == k_no_column) continue;
       BOOST_OUTCOME_TRY(*role, column(before.names[*role]));
     }
     find_raw_columns();
@@ -355,12 +304,12 @@ class TableReader {
       BOOST_OUTCOME_TRY(const auto at, column(name));
       group_columns_.push_back(at);
     }
-    if (group_columns_.empty() && header_.first(k_group) != k_none)
+    if (group_columns_.empty() && header_.first(k_group) != k_no_column)
       group_columns_.push_back(header_.first(k_group));
-    out_.grouping = !group_columns_.empty()           ? Grouping::column
-                    : several_files_                  ? Grouping::file
-                    : header_.first(k_time) != k_none ? Grouping::time_block
-                                                      : Grouping::row;
+    out_.grouping = !group_columns_.empty()                ? Grouping::column
+                    : several_files_                       ? Grouping::file
+                    : header_.first(k_time) != k_no_column ? Grouping::time_block
+                                                           : Grouping::row;
     for (const auto c : group_columns_)
       out_.group_by += (out_.group_by.empty() ? "" : ",") + header_.names[c];
     if (out_.grouping == Grouping::file) out_.group_by = "file";
@@ -374,15 +323,16 @@ class TableReader {
       placement_columns_.push_back(at);
     }
     const auto add = [&](std::size_t at) {
-      if (at != k_none) placement_columns_.push_back(at);
+      if (at != k_no_column) placement_columns_.push_back(at);
     };
     if (placement_columns_.empty()) add(header_.first(k_placement));
-    if (placement_columns_.empty() && header_.of("tag_pos") != k_none && header_.of("anchor_id") != k_none) {
+    if (placement_columns_.empty() && header_.of("tag_pos") != k_no_column &&
+        header_.of("anchor_id") != k_no_column) {
       add(header_.of("tag_pos"));
       add(header_.of("anchor_id"));
     }
     // A true range that repeats names its placement, together with the place and the class.
-    if (placement_columns_.empty() && truth_ != k_none) {
+    if (placement_columns_.empty() && truth_ != k_no_column) {
       placement_columns_ = group_columns_;
       placed_by_truth_ = true;
       add(truth_);
@@ -393,27 +343,33 @@ class TableReader {
     return boost::outcome_v2::success();
   }
 
-  /// The column says by its name what 0 and 1 mean, and nobody said otherwise.
-  bool named_after_class() const {
-    const auto name = plain_name(header_.names[label_]);
-    return options_.los_value.empty() &&
-           (name == "nlos" || name == "isnlos" || name == "los" || name == "islos");
-  }
-  /// 1 for yes, 0 for no, and the classes by their names.
-  static std::optional<char> class_word(std::string_view cell) {
-    const auto word = plain_name(cell);
-    const double value = number_or_nan(cell);
-    if (value == 0 || word == "false" || word == "no") return '0';
-    if (value == 1 || word == "true" || word == "yes") return '1';
-    if (word == "los") return 'L';
-    if (word == "nlos") return 'N';
+  /// Nothing where the row is to be left out, with the reason counted.
+  std::optional<bool> class_of(std::string_view cell, std::size_t line) {
+    const auto& name = header_.names[label_];
+    switch (classes_.read(name, cell)) {
+      case ClassReader::Said::los:
+        return true;
+      case ClassReader::Said::nlos:
+        return false;
+      case ClassReader::Said::nothing:
+        drop(name + " missing", line);
+        return std::nullopt;
+      case ClassReader::Said::untold:
+        fatal_ = make_error(Errc::invalid_argument,
+                            file_ + ":" + std::to_string(line) + ": " + untold_class(name, cell));
+        return std::nullopt;
+      case ClassReader::Said::unreadable:
+        break;
+    }
+    if (unreadable_class_.empty()) unreadable_class_ = cell;
+    drop(name + " is neither 0 nor 1, LOS nor NLOS", line);
     return std::nullopt;
   }
 
-  bool truth_given() const { return !options_.truth.empty() || header_.first(k_truth) != k_none; }
+  bool truth_given() const { return !options_.truth.empty() || header_.first(k_truth) != k_no_column; }
   bool no_levels() const {
     for (const auto* names : {&k_rx, &k_fp, &k_f1, &k_cir_power, &k_std_noise})
-      if (header_.first(*names) != k_none) return false;
+      if (header_.first(*names) != k_no_column) return false;
     return true;
   }
 
@@ -425,7 +381,7 @@ class TableReader {
   /// -999 and its like, by which loggers say that there is no level, are none.
   bool drop_impossible(std::size_t line) {
     for (const auto& [names, at] : level_columns_) {
-      if (at == k_none || std::isnan(values_[at])) continue;
+      if (at == k_no_column || std::isnan(values_[at])) continue;
       const bool level = names == &k_rx || names == &k_fp;
       if (names == &k_height || names == &k_heading) continue;
       const auto& bounds = level ? row_limits::k_dbm : row_limits::k_register;
@@ -447,34 +403,35 @@ class TableReader {
                 const std::vector<float>* taps) {
     values_.clear();
     for (const auto cell : cells) values_.push_back(number_or_nan(cell, decimal_comma_));
-    if (const auto at = header_.first(k_time); at != k_none && times_.size() < k_times_looked_at)
+    if (const auto at = header_.first(k_time); at != k_no_column && times_.size() < k_times_looked_at)
       times_.push_back(values_[at]);
     if (drop_impossible(line)) return;
     const auto value = [&](const Names& names) {
       const auto at = level_columns_.at(&names);
-      return at == k_none ? std::nullopt : finite(values_[at]);
+      return at == k_no_column ? std::nullopt : finite(values_[at]);
     };
     // A set without ranges can still tell classes by levels.
-    const double range = range_ == k_none ? 0 : values_[range_] * metres_per_unit(header_.names[range_]);
-    if (range_ != k_none && !(range > 0))
+    const double range =
+        range_ == k_no_column ? 0 : values_[range_] * metres_per_unit(header_.names[range_]).value_or(1);
+    if (range_ != k_no_column && !(range > 0))
       return drop(header_.names[range_] + (std::isnan(range) ? lacks(cells[range_]) : " not above zero"),
                   line);
-    if (range > 1e4) return drop(header_.names[range_] + " above 10 km", line);
     // A class needs no true range: whoever asks for a bias leaves rows without one out.
     std::optional<double> truth;
-    if (truth_ != k_none && !says_nothing(cells[truth_])) {
-      truth = finite(values_[truth_] * metres_per_unit(header_.names[truth_]));
+    if (truth_ != k_no_column && !says_nothing(cells[truth_])) {
+      truth = finite(values_[truth_] * metres_per_unit(header_.names[truth_]).value_or(1));
+      if (truth) ratios_.add(range, *truth);
       if (!truth) return drop(header_.names[truth_] + " is no number", line);
       if (!(*truth > 0) || *truth > 1e4) return drop(header_.names[truth_] + " impossible", line);
     }
-    if (range_ != k_none && truth && std::abs(range - *truth) > ml::k_most_bias_m)
+    if (range > 1e4) return drop(header_.names[range_] + " above 10 km", line);
+    if (range_ != k_no_column && truth && std::abs(range - *truth) > ml::k_most_bias_m)
       return drop(header_.names[range_] + " is more than 100 m off its true range", line);
-    if (label_ != k_none && cells[label_].empty()) return drop(header_.names[label_] + " missing", line);
-    if (label_ != k_none && named_after_class() && !class_word(cells[label_]))
-      return drop(header_.names[label_] + " is neither 0 nor 1, LOS nor NLOS", line);
+    std::optional<bool> los;
+    if (label_ != k_no_column && !(los = class_of(cells[label_], line))) return;
 
     nlos::DiagnosticSample s;
-    if (range_ != k_none) s.range_m = range;
+    if (range_ != k_no_column) s.range_m = range;
     s.rx_dbm = value(k_rx);
     s.fp_dbm = value(k_fp);
     s.fp_amp1 = value(k_f1);
@@ -493,11 +450,10 @@ class TableReader {
       if (!s.cir) return drop("no first path in the CIR", line);
     }
     out_.features.push_back(nlos::compute_features(s));
-    for (const auto c : raw_columns_) out_.raw.push_back(c == k_none ? k_nan : values_[c]);
+    for (const auto c : raw_columns_) out_.raw.push_back(c == k_no_column ? k_nan : values_[c]);
     out_.range_m.push_back(range);
     out_.true_range_m.push_back(truth);
-    out_.los.emplace_back();
-    labels_.emplace_back(label_ == k_none ? std::string{} : std::string{cells[label_]});
+    out_.los.push_back(los);
     std::string group = out_.grouping == Grouping::file ? file_ : joined(cells, group_columns_);
     if (out_.grouping == Grouping::row && !placement_columns_.empty())
       group = joined(cells, placement_columns_);
@@ -514,44 +470,19 @@ class TableReader {
     if (out_.placement.back() == out_.placement_names.size()) out_.placement_names.push_back(own);
   }
 
-  Result<void> map_labels() {
-    if (label_ == k_none) return boost::outcome_v2::success();
-    std::string los_value = options_.los_value;
-    const auto& name = header_.names[label_];
-    if (named_after_class()) {
-      const bool nlos = plain_name(name).ends_with("nlos");
-      for (std::size_t i = 0; i < labels_.size(); ++i) {
-        const char word = class_word(labels_[i]).value_or('N');
-        out_.los[i] = word == 'L' || word == (nlos ? '0' : '1');
-      }
-      return boost::outcome_v2::success();
-    }
-    for (const char* word : {"LOS", "los", "Los"})
-      if (los_value.empty() && std::find(labels_.begin(), labels_.end(), word) != labels_.end())
-        los_value = word;
-    if (los_value.empty()) los_value = *std::min_element(labels_.begin(), labels_.end());
-    std::size_t los = 0;
-    for (std::size_t i = 0; i < labels_.size(); ++i) {
-      const double a = number_or_nan(labels_[i]), b = number_or_nan(los_value);
-      out_.los[i] = !std::isnan(a) && !std::isnan(b) ? a == b : labels_[i] == los_value;
-      los += *out_.los[i] ? 1 : 0;
-    }
-    if (los == 0 && !options_.los_value.empty())
-      return make_error(Errc::invalid_argument,
-                        file_ + ": no row of column " + name + " is \"" + los_value + "\"");
-    return boost::outcome_v2::success();
-  }
-
   const TableOptions& options_;
   bool several_files_;
   bool decimal_comma_{false}, placed_by_truth_{false};
   std::string file_;
   Header header_{};
-  std::size_t range_{k_none}, label_{k_none}, truth_{k_none};
+  std::size_t range_{k_no_column}, label_{k_no_column}, truth_{k_no_column};
   std::vector<std::size_t> group_columns_, placement_columns_, raw_columns_;
   std::map<const Names*, std::size_t> level_columns_;  ///< what features are computed from
   std::vector<double> values_, times_;
-  std::vector<std::string> labels_;
+  ClassReader classes_;
+  std::string unreadable_class_{};  ///< the first
+  Ratios ratios_{};
+  std::optional<Error> fatal_{};
   Ids groups_, placements_;
   LabelledTable out_;
 };

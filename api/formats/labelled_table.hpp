@@ -17,11 +17,10 @@
 namespace anchord::api {
 
 struct TableOptions {
-  std::string label{};  ///< column; empty: nlos, is_nlos, los, label, cls, class
-  std::string
-      los_value{};  ///< what means LOS there; empty: 0 for nlos, 1 for los, else the lowest class or "LOS"
-  std::string range{};                         ///< column of the measured range; empty: range_m and its kin
-  std::string truth{};                         ///< column of the true range; empty: true_range_m and its kin
+  std::string label{};      ///< column; empty: nlos, is_nlos, los, label, cls, class
+  std::string los_value{};  ///< what means LOS there; empty: as the name of the column or the words say
+  std::string range{};      ///< column of the measured range; empty: range_m and its kin
+  std::string truth{};      ///< column of the true range; empty: true_range_m and its kin
   std::vector<std::string> group_by{};         ///< columns naming a place; empty: env, setup, tag_pos, ...
   std::vector<std::string> placement{};        ///< columns naming one placement; empty: setup_id, ...
   std::optional<std::filesystem::path> cir{};  ///< table of |taps| m0.. with join columns (setup, idx)
@@ -42,6 +41,7 @@ struct LabelledTable {
   std::vector<double> range_m{};  ///< 0 throughout where the table has no ranges, only levels
   std::vector<std::uint32_t> group{}, placement{};
   std::vector<std::string> group_names{};
+  std::string los_value{};  ///< of the label column: what was taken for LOS
   std::string label_column{}, truth_column{}, group_by{}, placement_by{};
   Grouping grouping{Grouping::row};
   std::size_t rows_read{};

@@ -134,7 +134,7 @@ Response change_campaign(LearningApi& l, const Request& request) {
 
 Response import(LearningApi& l, const Request& request) {
   check_query(request, {"dry_run", "environment", "setting", "material", "distance_m", "heading_deg",
-                        "height_difference_m", "thickness_m", "los"});
+                        "height_difference_m", "thickness_m", "los", "los_value"});
   const CampaignRecord campaign = named_campaign(l, request);
   const bool dry_run = query_flag(request, "dry_run");
   auto read = read_campaign_rows(request);

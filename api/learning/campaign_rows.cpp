@@ -5,6 +5,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "api/formats/binary_file.hpp"
 #include "api/formats/campaign.hpp"
 #include "api/kit/problem.hpp"
 #include "api/kit/reader.hpp"
@@ -59,9 +60,12 @@ Ordered report_json(const CampaignReport& report) {
                         {"outliers", site.outliers},
                         {"median_m", site.median_m},
                         {"sd_m", site.sd_m}});
+  Ordered classes = Ordered::array();
+  for (const auto& [column, value] : report.classes) classes.push_back({{"column", column}, {"los", value}});
   return {{"read", report.lines},          {"kept", report.kept},
           {"dropped", std::move(dropped)}, {"errors", lines_json(report.errors)},
-          {"warnings", report.warnings},   {"settings", std::move(settings)}};
+          {"warnings", report.warnings},   {"unused", report.unused},
+          {"classes", std::move(classes)}, {"settings", std::move(settings)}};
 }
 
 }  // namespace
@@ -77,9 +81,12 @@ CampaignRows read_campaign_rows(const Request& request) {
   d.heading_deg = query_number(request, "heading_deg", -720, 720);
   d.height_m = query_number(request, "height_difference_m", -1000, 1000);
   d.thickness_m = query_number(request, "thickness_m", 0, 100);
+  options.los_value = request.query_value("los_value").value_or("");
   if (request.query_value("los")) d.los = query_flag(request, "los");
   // Excel writes UTF-16 with its mark; whatever else is no UTF-8 is refused with what to do.
   const bool wide = request.body.starts_with("\xFF\xFE") || request.body.starts_with("\xFE\xFF");
+  if (const auto what = binary_file(request.body); !what.empty())
+    throw_problem(422, "validation", what, {{"", "unreadable", what}});
   const auto read = import_campaign(wide ? request.body : text_body(request), options);
   if (!read)
     throw_problem(422, "validation", read.error().message, {{"", "unreadable", read.error().message}});
@@ -121,7 +128,8 @@ CampaignRows read_campaign_rows(const Request& request) {
     out.rows.push_back(std::move(row));
   }
   auto report = report_json(read.value().report);
-  report["warnings"] = Ordered::array();  // those about names: together with what is stored
+  // Those about names come together with what is stored.
+  report["warnings"] = read.value().report.oddities;
   if (odd_times > 0)
     report["warnings"].push_back("the times of " + std::to_string(odd_times) +
                                  " rows are no seconds since 1970 and are left out, the first in line " +

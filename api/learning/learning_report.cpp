@@ -28,6 +28,7 @@ Ordered json_of(const RowReport& r) {
                     {"truth", text(r.truth)},
                     {"group_by", text(r.group_by)},
                     {"placement", text(r.placement)}};
+  out["columns"]["los_value"] = text(r.los_value);
   out["columns"]["unused"] = r.unused;
   if (!r.warning.empty()) out["warning"] = r.warning;
   if (!r.warnings.empty()) out["warnings"] = r.warnings;
@@ -53,6 +54,8 @@ std::string text_of(const RowReport& r) {
   for (const auto& [reason, entry] : r.dropped)
     out += format("\n  dropped %zu: %s%s%s", entry.first, reason.c_str(),
                   entry.second.empty() ? "" : ", first ", entry.second.c_str());
+  if (!r.label.empty() && !r.los_value.empty())
+    out += "\nclass: " + r.los_value + " of column " + r.label + " is LOS";
   if (!r.group_by.empty()) out += "\nplaces by: " + r.group_by;
   std::string unused;
   for (const auto& name : r.unused) {

@@ -21,6 +21,7 @@ struct RowReport {
   std::string warning{};                ///< an optimistic split, for one
   std::vector<std::string> unused{};    ///< columns that nothing was taken from
   std::vector<std::string> warnings{};  ///< what is odd about the table
+  std::string los_value{};              ///< of the label column: what was taken for LOS
 };
 
 std::string train_json(const ml::TrainingOutcome& outcome, const RowReport& rows,

@@ -13,8 +13,10 @@
 namespace anchord::cli {
 namespace {
 
+constexpr std::size_t k_most_unused = 400;  // characters
+
 struct CampaignArguments {
-  std::string file, out, environment, material, site, label;
+  std::string file, out, environment, material, site, label, los_value;
   api::CampaignFormat format{api::CampaignFormat::detect};
   double distance_m{-1}, heading_deg{0}, height_m{0}, thickness_m{0};
   bool has_heading{false}, has_height{false}, has_thickness{false}, keep_outliers{false};
@@ -24,6 +26,7 @@ api::CampaignOptions options_of(const CampaignArguments& a) {
   api::CampaignOptions o;
   o.format = a.format;
   o.filter = !a.keep_outliers;
+  o.los_value = a.los_value;
   o.defaults.name = a.site;
   o.defaults.environment = a.environment;
   o.defaults.material = a.material;
@@ -44,7 +47,20 @@ void print_report(const api::CampaignReport& r, std::FILE* to) {
     if (drop.count > drop.first.size())
       std::fprintf(to, "    and %zu more\n", drop.count - drop.first.size());
   }
+  for (const auto& [column, value] : r.classes)
+    std::fprintf(to, "  class: %s of column %s is LOS\n", printable(value).c_str(),
+                 printable(column).c_str());
+  std::string unused;
+  for (const auto& name : r.unused) {
+    if (unused.size() > k_most_unused) {
+      unused += ", ...";
+      break;
+    }
+    unused += (unused.empty() ? "" : ", ") + name;
+  }
+  if (!unused.empty()) std::fprintf(to, "  columns not used: %s\n", printable(unused).c_str());
   for (const auto& warning : r.warnings) std::fprintf(to, "  warning: %s\n", printable(warning).c_str());
+  for (const auto& odd : r.oddities) std::fprintf(to, "  warning: %s\n", printable(odd).c_str());
   for (const auto& s : r.sites)
     std::fprintf(to, "  %-24s %6zu kept, %zu zero, %zu outliers, median %.3f m, sd %.3f m\n", s.name.c_str(),
                  s.kept, s.zero, s.outliers, s.median_m, s.sd_m);
@@ -91,6 +107,8 @@ void add_campaign_command(CLI::App& app, int& exit_code) {
   auto* height = command->add_option("--height-m", a->height_m, "Height difference of the antennas");
   auto* thickness = command->add_option("--thickness-m", a->thickness_m, "Of the obstacle");
   command->add_option("--label", a->label, "LOS or NLOS")->check(CLI::IsMember({"LOS", "NLOS"}));
+  command->add_option("--los-value", a->los_value,
+                      "Value that means LOS in a column of the class that does not say it by its name");
   command->add_flag("--keep-outliers", a->keep_outliers, "Drop zero ranges only");
   command->callback([a, heading, height, thickness, &exit_code] {
     a->has_heading = heading->count() > 0;

@@ -5,6 +5,7 @@
 
 #include "api/learning/freeze_rows.hpp"
 #include "api/learning/labelled_dataset.hpp"
+#include "core/base/text.hpp"
 #include "core/base/whole_file.hpp"
 #include "server/cli/commands.hpp"
 #include "server/cli/failed.hpp"
@@ -28,6 +29,17 @@ void print_set(const api::FrozenDataset& set, const std::string& digest) {
   std::printf("digest %s\n%s", digest.c_str(), api::split_report_text(set).c_str());
 }
 
+/// What the columns were taken for, and what of the table was not used.
+void print_columns(const api::LabelledTable& table) {
+  if (!table.los_value.empty())
+    std::printf("class: %s of column %s is LOS\n", printable(table.los_value).c_str(),
+                printable(table.label_column).c_str());
+  std::string unused;
+  for (const auto& name : table.unused) unused += (unused.empty() ? "" : ", ") + name;
+  if (!unused.empty()) std::printf("columns not used: %s\n", printable(unused.substr(0, 400)).c_str());
+  for (const auto& warning : table.warnings) std::printf("warning: %s\n", printable(warning).c_str());
+}
+
 int build(const DatasetArguments& a) {
   const auto table = read_data(a.data);
   if (!table) return refuse("dataset", table.error().message);
@@ -46,6 +58,7 @@ int build(const DatasetArguments& a) {
   if (const auto written = write_whole(a.out, csv); !written)
     return failed("anchord dataset", written.error().message);
   print_set(set.value(), api::dataset_digest(csv));
+  print_columns(table.value());
   return 0;
 }
 

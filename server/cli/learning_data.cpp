@@ -20,7 +20,9 @@ void add_data_options(CLI::App& command, DataOptions& o) {
       ->required();
   command.add_option("--cir", o.cir, "CSV of CIR magnitudes m0, m1, ... joined by setup, idx or seq");
   command.add_option("--label", o.table.label, "Column of the class (default: nlos, los, label, cls)");
-  command.add_option("--los-value", o.table.los_value, "Value of that column that means LOS");
+  command.add_option(
+      "--los-value", o.table.los_value,
+      "Value of that column that means LOS, where its name does not say it (label, cls, class)");
   command.add_option("--range", o.table.range,
                      "Column of the measured range (default: range_m and similar names)");
   command.add_option("--truth", o.table.truth,
@@ -43,7 +45,7 @@ Result<api::LabelledTable> read_data(const DataOptions& o) {
 api::RowReport row_report(const DataOptions& o, const api::LabelledTable& table) {
   api::RowReport report{
       o.files,        table.rows_read,    table.rows(), table.dropped, table.label_column, table.truth_column,
-      table.group_by, table.placement_by, {},           table.unused,  table.warnings};
+      table.group_by, table.placement_by, {},           table.unused,  table.warnings,     table.los_value};
   if (table.grouping == api::Grouping::row)
     report.warning =
         table.placement_by.empty()

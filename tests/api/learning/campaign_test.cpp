@@ -233,4 +233,93 @@ TEST(Campaign, HostileTextEndsInAnErrorNotInACrash) {
   }
 }
 
+/// 0 was LOS for training and NLOS for campaigns, of the same file.
+TEST(Campaign, RefusesNumbersOfAClassUntilSomebodySaysWhichIsLos) {
+  using ::testing::HasSubstr;
+  for (const std::string name : {"cls", "label", "class"}) {
+    const std::string text = name + ",range_m\n1,5\n0,6\n";
+    const auto untold = import_campaign(text);
+    ASSERT_FALSE(untold) << name;
+    EXPECT_THAT(untold.error().message, HasSubstr("los_value"));
+    CampaignOptions options;
+    options.los_value = "0";
+    const auto told = import_campaign(text, options);
+    ASSERT_TRUE(told) << told.error().message;
+    ASSERT_EQ(told.value().campaign.sites.size(), 2U);
+    EXPECT_EQ(told.value().campaign.sites[0].los, false);
+    EXPECT_EQ(told.value().campaign.sites[1].los, true);
+    EXPECT_EQ(told.value().report.classes, (std::map<std::string, std::string>{{name, "0"}}));
+    options.los_value = "2";
+    EXPECT_FALSE(import_campaign(text, options));
+  }
+  const auto pandas = import_campaign("NLOS,range_m\nTrue,5\nFalse,6\n");
+  ASSERT_TRUE(pandas) << pandas.error().message;
+  EXPECT_EQ(pandas.value().campaign.sites.at(0).los, false);
+  EXPECT_EQ(pandas.value().report.classes, (std::map<std::string, std::string>{{"NLOS", "False"}}));
+  const auto beside = import_campaign("label,nlos,range_m\nsoft wall,1,5\n2,0,6\n");
+  ASSERT_TRUE(beside) << beside.error().message;
+  EXPECT_EQ(beside.value().report.kept, 2U);
+  EXPECT_EQ(beside.value().campaign.sites.at(0).los, false);
+  const auto against = import_campaign("los,nlos,range_m\n1,1,5\n1,0,5\n");
+  ASSERT_TRUE(against);
+  EXPECT_EQ(against.value().report.kept, 1U);
+}
+
+TEST(Campaign, FindsColumnsHoweverTheyAreSpelledAndNamesThoseItDoesNotUse) {
+  // The header of eWINE's part1.csv, with an impulse response of five taps.
+  const auto read = import_campaign(
+      "NLOS,RANGE,FP_IDX,FP_AMP1,FP_AMP2,FP_AMP3,STDEV_NOISE,CIR_PWR,MAX_NOISE,RXPACC,CH,FRAME_LEN,PREAM_LEN,"
+      "BITRATE,PRFR,CIR0,CIR1,CIR2,CIR3,CIR4\n"
+      "1.0,6.18,749.0,4889.0,13876.0,10464.0,240.0,9048.0,3668.0,1024.0,2,39,1024,110,64,1,2,3,4,5\n");
+  ASSERT_TRUE(read) << read.error().message;
+  ASSERT_EQ(read.value().campaign.measurements.size(), 1U);
+  const auto& m = read.value().campaign.measurements[0];
+  EXPECT_EQ(m.range_m, 6.18);
+  EXPECT_EQ(m.fp_index, 749);
+  EXPECT_EQ(m.std_noise, 240);
+  EXPECT_EQ(read.value().campaign.sites[0].los, false);
+  EXPECT_EQ(read.value().report.unused, (std::vector<std::string>{"CH", "FRAME_LEN", "PREAM_LEN", "BITRATE",
+                                                                  "PRFR", "CIR0 to CIR4 (5 columns)"}));
+  const auto spelled =
+      import_campaign("Environment,True Distance [cm],LOS,Range (cm),RX_dBm,note\nhall,500,1,510,-80,x\n");
+  ASSERT_TRUE(spelled) << spelled.error().message;
+  ASSERT_EQ(spelled.value().campaign.measurements.size(), 1U);
+  EXPECT_NEAR(spelled.value().campaign.measurements[0].range_m, 5.1, 1e-12);
+  EXPECT_EQ(spelled.value().campaign.measurements[0].rx_dbm, -80);
+  EXPECT_NEAR(*spelled.value().campaign.sites[0].distance_m, 5.0, 1e-12);
+  EXPECT_EQ(spelled.value().campaign.sites[0].environment, "hall");
+  EXPECT_EQ(spelled.value().report.unused, std::vector<std::string>{"note"});
+  const auto json = import_campaign("{\"Range_mm\":5100,\"true_distance_mm\":5000,\"note\":1}\n");
+  ASSERT_TRUE(json) << json.error().message;
+  EXPECT_NEAR(*json.value().campaign.sites[0].distance_m, 5.0, 1e-12);
+  EXPECT_EQ(json.value().report.unused, std::vector<std::string>{"note"});
+}
+
+TEST(Campaign, RefusesRangesAndTruthOfTwoUnits) {
+  using ::testing::AllOf;
+  using ::testing::HasSubstr;
+  const auto why = [](const std::string& text) {
+    const auto read = import_campaign(text);
+    return read ? std::string() : read.error().message;
+  };
+  EXPECT_THAT(why("range_m,true_distance_m\n5100,5\n6200,6\n"),
+              AllOf(HasSubstr("\"range_m\""), HasSubstr("rename it to range_mm")));
+  EXPECT_THAT(why("range,true_distance_m\n510,5\n620,6\n"), HasSubstr("rename it to range_cm"));
+  EXPECT_THAT(why("range_m,true_distance_m\n5.1,5000\n6.2,6000\n"), HasSubstr("true_distance_mm"));
+  EXPECT_EQ(why("range_m,true_distance_m\n7.1,5\n6.2,6\n"), "");
+}
+
+TEST(Campaign, RefusesWhatIsNoTextWithWhatItIs) {
+  using ::testing::HasSubstr;
+  const auto why = [](const std::string& text) {
+    const auto read = import_campaign(text);
+    return read ? std::string() : read.error().message;
+  };
+  EXPECT_THAT(why(std::string("PK\x03\x04 1 2 3\n1000 4510 -79\n")), HasSubstr("zip"));
+  EXPECT_THAT(why("MATLAB 5.0 MAT-file, 1 2\n1000 4510 -79\n"), HasSubstr("writetable"));
+  EXPECT_THAT(why("#ROSBAG V2.0\n1000 4510 -79\n"), HasSubstr("rostopic echo"));
+  EXPECT_THAT(why("\x1F\x8B\b1000 4510 -79\n"), HasSubstr("gzip"));
+  EXPECT_THAT(why("\x01\x02\x03\x04 1000 4510\n"), HasSubstr("binary"));
+}
+
 }  // namespace anchord::api::campaign_test

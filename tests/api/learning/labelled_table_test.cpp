@@ -202,12 +202,42 @@ TEST_F(LabelledTableTest, RefusesATruncatedGzipInsteadOfTrainingOnHalfOfIt) {
   EXPECT_FALSE(read({whole}));
 }
 
-TEST_F(LabelledTableTest, TakesTheLowestClassNumberForLosUnlessToldOtherwise) {
-  const auto path = plain("r.csv", "cls,range_m\n2,1\n1,1\n3,1\n");
-  EXPECT_EQ(read({path}).value().los, (std::vector<std::optional<bool>>{false, true, false}));
-  TableOptions options;
-  options.los_value = "3";
-  EXPECT_EQ(read({path}, options).value().los, (std::vector<std::optional<bool>>{false, false, true}));
+TEST_F(LabelledTableTest, RefusesNumbersOfAClassUntilSomebodySaysWhichIsLos) {
+  for (const std::string name : {"cls", "label", "class"}) {
+    const auto path = plain("r.csv", name + ",range_m\n2,1\n1,1\n3,1\n");
+    const auto untold = read({path});
+    ASSERT_FALSE(untold) << name;
+    EXPECT_NE(untold.error().message.find("--los-value"), std::string::npos) << untold.error().message;
+    TableOptions options;
+    options.los_value = "3";
+    const auto told = read({path}, options);
+    ASSERT_TRUE(told) << told.error().message;
+    EXPECT_EQ(told.value().los, (std::vector<std::optional<bool>>{false, false, true}));
+    EXPECT_EQ(told.value().los_value, "3");
+    options.los_value = "7";
+    EXPECT_FALSE(read({path}, options));
+  }
+  const auto words = read({plain("w.csv", "class,range_m\nLOS,5\nNDP NLOS,5\nnlos,5\n")});
+  ASSERT_TRUE(words) << words.error().message;
+  EXPECT_EQ(words.value().los, (std::vector<std::optional<bool>>{true, false, false}));
+  const auto pandas = read({plain("p.csv", "is_los,range_m\nTrue,5\nFalse,5\n")});
+  ASSERT_TRUE(pandas) << pandas.error().message;
+  EXPECT_EQ(pandas.value().los, (std::vector<std::optional<bool>>{true, false}));
+  EXPECT_EQ(pandas.value().los_value, "True");
+}
+
+TEST_F(LabelledTableTest, RefusesRangesAndTruthOfTwoUnitsAndFilesThatAreNoText) {
+  const auto mixed =
+      read({plain("r.csv", "nlos,range_m,true_range_m\n0,5100,5.0\n1,6900,6.0\n0,3010,3.0\n")});
+  ASSERT_FALSE(mixed);
+  EXPECT_NE(mixed.error().message.find("rename it to range_mm"), std::string::npos) << mixed.error().message;
+  const auto cm = read({plain("c.csv", "nlos,range [cm],true_distance_cm\n0,510,500\n")});
+  ASSERT_TRUE(cm) << cm.error().message;
+  EXPECT_NEAR(cm.value().range_m.at(0), 5.1, 1e-12);
+  EXPECT_NEAR(*cm.value().true_range_m.at(0), 5.0, 1e-12);
+  const auto zip = read({plain("x.xlsx", std::string("PK\x03\x04\x14\0\6\0,1,2\n5,6,7\n", 20))});
+  ASSERT_FALSE(zip);
+  EXPECT_NE(zip.error().message.find("save the sheet as CSV"), std::string::npos) << zip.error().message;
 }
 
 TEST_F(LabelledTableTest, SplitsByFileWhereSeveralAreGivenAndNoColumnNamesAPlace) {
