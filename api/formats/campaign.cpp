@@ -166,12 +166,14 @@ class Importer {
   }
 
   void take_csv(std::string_view line, std::size_t at) {
-    if (header_.empty() && line.starts_with("sep=") && line.size() == 5) {  // of Excel, above the header
-      separator_ = line[4];
-      separator_told_ = true;
-      return;
+    if (header_.empty()) {
+      if (const char named = separator_named_by(line); named != '\0') {
+        separator_ = named;
+        separator_named_ = true;
+        return;
+      }
+      if (!separator_named_) separator_ = separator_of(line);
     }
-    if (header_.empty() && !separator_told_) separator_ = separator_of(line);
     CsvRecord record({separator_});
     const auto read = record.read(line);
     const auto& cells = record.cells();
@@ -224,8 +226,7 @@ class Importer {
             (separator_ == '\t' ? std::string("tab") : std::string(1, separator_)) +
             "\" between cells, the columns are " + columns.substr(0, 600) +
             ": is there a header? Name the columns in the first line, or give a .txt of time in ms, distance "
-            "in mm "
-            "and RSS in dBm");
+            "in mm and RSS in dBm");
   }
 
   void take_json(std::string_view line, std::size_t at) {
@@ -566,7 +567,7 @@ class Importer {
   Ratios ratios_{};
   std::string ratio_range_{}, ratio_truth_{};
   char separator_{','};
-  bool separator_told_{false};
+  bool separator_named_{false};
   std::size_t last_{static_cast<std::size_t>(-1)};
   std::optional<Error> fatal_;
   CampaignImport out_;

@@ -71,8 +71,9 @@ struct CampaignImport {
 
 /// Bad lines never sink good ones: they are counted and named.
 /// text    UTF-8, or UTF-16 with its mark; see docs/learning.md for the columns and for the `# key = value`
-/// lines of a .txt errors  bad_frame (no text, no header, no line that can be read), invalid_argument (no
-/// range column, two of one name, a class that does not say what is LOS, ranges and truth of two units)
+/// lines of a .txt
+/// errors  bad_frame (no text, no header, no line that can be read), invalid_argument (no range column, two
+/// of one name, a class that does not say what is LOS, ranges and truth of two units)
 Result<CampaignImport> import_campaign(std::string_view text, const CampaignOptions& options = {});
 
 /// The campaign as a table of labelled rangings: features computed, a place per environment, a placement per

@@ -13,8 +13,7 @@ constexpr std::size_t k_numbers = 3;
 constexpr std::array<std::string_view, k_numbers> k_units{"ms", "mm", "dbm"};
 constexpr std::string_view k_what_to_do =
     ": a .txt line is time in ms, distance in mm and RSS in dBm; give anything else as CSV with a header "
-    "(t_s "
-    "or t_ms, range_m or range_mm, rx_dbm)";
+    "(t_s or t_ms, range_m or range_mm, rx_dbm)";
 
 /// The number a name announces.
 std::optional<std::size_t> announced(std::string_view word) {
@@ -34,13 +33,6 @@ bool is_letter(char c) {
          static_cast<unsigned char>(c) >= 0x80;
 }
 bool is_between(char c) { return std::string_view(" \t;,:=()[]\"'").find(c) != std::string_view::npos; }
-
-std::string lower(std::string_view word) {
-  std::string out(word);
-  for (char& c : out)
-    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
-  return out;
-}
 
 std::string shown(std::string_view text) { return '"' + to_utf8(text, 40) + '"'; }
 
@@ -78,7 +70,7 @@ class LineReader {
   std::size_t take_word(std::size_t i) {
     std::size_t end = i;
     while (end < line_.size() && (is_letter(line_[end]) || is_digit(line_[end]))) ++end;
-    const auto word = lower(line_.substr(i, end - i));
+    const auto word = lower_case(line_.substr(i, end - i));
     if (const auto number = announced(word)) {
       if (*number != n_) fail("the number " + shown(word) + " announces is not the " + ordinal(n_));
     } else if (const auto unit = std::ranges::find(k_units, word); unit != k_units.end()) {
@@ -137,7 +129,7 @@ bool is_campaign_line(std::string_view line) {
     }
     std::size_t end = i;
     while (end < line.size() && (is_letter(line[end]) || is_digit(line[end]))) ++end;
-    const auto word = lower(line.substr(i, end - i));
+    const auto word = lower_case(line.substr(i, end - i));
     if (!announced(word) && std::ranges::find(k_units, word) == k_units.end()) return false;
     i = end;
   }

@@ -25,6 +25,29 @@ char separator_of(std::string_view header) {
   return best;
 }
 
+char separator_named_by(std::string_view line) {
+  if (line.ends_with('\r')) line.remove_suffix(1);
+  if (line.size() == 7 && line.starts_with('"') && line.ends_with('"')) line = line.substr(1, 5);
+  return line.size() == 5 && lower_case(line.substr(0, 4)) == "sep=" ? line[4] : '\0';
+}
+
+std::string lower_case(std::string_view text) {
+  std::string out(text);
+  std::ranges::transform(out, out.begin(),
+                         [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; });
+  return out;
+}
+
+std::string listed_briefly(std::span<const std::string> names) {
+  constexpr std::size_t k_enough = 400;
+  std::string out;
+  for (const auto& name : names) {
+    if (out.size() > k_enough) return out + ", ...";
+    out += (out.empty() ? "" : ", ") + name;
+  }
+  return out;
+}
+
 std::optional<double> cell_number(std::string_view cell, bool decimal_comma) {
   if (!decimal_comma || cell.find(',') == std::string_view::npos) return plain_number(cell);
   // "1.234,5" and "1,234,567" mean something else in every country: no number.
@@ -36,8 +59,7 @@ std::optional<double> cell_number(std::string_view cell, bool decimal_comma) {
 
 bool says_nothing(std::string_view cell) {
   constexpr std::array<std::string_view, 7> k_words{"", "nan", "na", "n/a", "null", "none", "-"};
-  std::string word;
-  for (const char c : cell) word += c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+  const std::string word = lower_case(cell);
   return std::find(k_words.begin(), k_words.end(), word) != k_words.end();
 }
 

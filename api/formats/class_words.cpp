@@ -69,8 +69,7 @@ std::string untold_class(std::string_view column, std::string_view cell) {
   const auto quoted = [](std::string_view text) { return '"' + to_utf8(text, 40) + '"'; };
   return "column " + quoted(column) + " has " + quoted(cell) +
          " and does not say which value is LOS: name the value that is (--los-value, over REST los_value), "
-         "or "
-         "rename the column to los (1 is LOS) or nlos (1 is NLOS)";
+         "or rename the column to los (1 is LOS) or nlos (1 is NLOS)";
 }
 
 }  // namespace anchord::api

@@ -131,8 +131,8 @@ std::string unit_conflict(const Ratios& ratios, std::string_view range, std::str
     std::array<char, 80> text{};
     std::snprintf(text.data(), text.size(), "%.3g times", ratio);
     std::string out = quoted(range) + " is impossible beside " + quoted(truth) + ": " + text.data() +
-                      " the truth in the middle of " + std::to_string(values.size()) +
-                      " rows, so one of the two is of another unit than its name says";
+                      " the truth, by the median of " + std::to_string(values.size()) +
+                      " rows, so one of the two is in another unit than its name says";
     const auto of_range = remedy(range, 1 / factor);
     auto of_truth = remedy(truth, factor);
     if (const auto at = of_truth.rfind("range_"); at != std::string::npos)

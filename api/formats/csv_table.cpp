@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <charconv>
 
+#include "api/formats/cells.hpp"
 #include "core/base/text.hpp"
 
 namespace anchord {
@@ -26,10 +27,13 @@ Result<CsvTable> CsvTable::open(const std::filesystem::path& folder, const std::
   CsvTable table(file.string(), std::move(lines));
   BOOST_OUTCOME_TRY(bool any, table.read_record());
   // The line by which Excel is told the separator.
-  if (any && table.record_.cells().size() <= 2 && table.record_.cells().front().starts_with("sep=")) {
-    if (const auto cell = table.record_.cells().front(); cell.size() == 5)
-      table.record_ = api::CsvRecord({cell[4], true});
-    BOOST_OUTCOME_TRY(any, table.read_record());
+  if (any) {
+    const auto& cells = table.record_.cells();
+    const bool comma = cells.size() == 2 && cells[0] == "sep=" && cells[1].empty();
+    if (const char named = comma ? ',' : api::separator_named_by(cells.front()); named != '\0') {
+      table.record_ = api::CsvRecord({named, true});
+      BOOST_OUTCOME_TRY(any, table.read_record());
+    }
   }
   if (!any) return make_error(Errc::invalid_argument, table.file_ + ": empty, expected a header line");
   for (const auto name : table.record_.cells()) {

@@ -189,8 +189,7 @@ std::string words_of(const std::string& need, const ForeignTable& track, const F
   if (need == k_needs_heading)
     return track.name() + ": '" + std::string(column_of(r.tc, "heading")) +
            "' has no unit, and no value beyond two pi: give --heading deg or rad (clockwise from true "
-           "north), "
-           "deg_ccw_from_east or rad_ccw_from_east (ROS)";
+           "north), deg_ccw_from_east or rad_ccw_from_east (ROS)";
   if (need == k_needs_addresses)
     return ranges.name() +
            ": addresses look like hexadecimal numbers without 0x, 1021 beside 9E04: give --addresses hex, or "
@@ -207,16 +206,14 @@ std::string words_of(const std::string& need, const ForeignTable& track, const F
     return track.name() +
            ": the columns of latitude and longitude are not in decimal degrees (degrees and minutes, or one "
            "for the other?): write decimal degrees, exchange them with --column track.lat=NAME and "
-           "track.lon, "
-           "or give --column track.x=NAME, track.y, track.z and --crs EPSG:CODE of a map";
+           "track.lon, or give --column track.x=NAME, track.y, track.z and --crs EPSG:CODE of a map";
   if (need == k_needs_crs)
     return track.name() + ": x, y, z are " + k_of_a_map + ": --crs EPSG:25832, UTM 32N or ECEF";
   if (need == k_needs_heights)
     return track.name() + ": it is not stated what the heights in '" +
            std::string(column_of(r.tc, r.local ? "z" : "height")) +
            "' are above: --heights ellipsoidal, EPSG:5773 (mean sea level, EGM96), metres of the geoid "
-           "there, or "
-           "column with --column track.separation=NAME";
+           "there, or column with --column track.separation=NAME";
   if (need == k_needs_time_of_ranges || need == "anchor" || need == "range") {
     const std::string field = need == k_needs_time_of_ranges ? "time" : need;
     return ranges.name() + ": no column was found for the " + field + " (have: " + listed(ranges.columns()) +

@@ -1,22 +1,15 @@
 #include "api/formats/foreign_text.hpp"
 
 #include <algorithm>
-#include <cctype>
 #include <vector>
 
+#include "api/formats/cells.hpp"
 #include "api/formats/foreign_values.hpp"
 
 namespace anchord::api {
 namespace {
 
 constexpr std::size_t k_looked_at = 2000;
-
-std::string lower(std::string_view text) {
-  std::string out(text);
-  std::ranges::transform(out, out.begin(),
-                         [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c + 32) : c; });
-  return out;
-}
 
 /// The first line that is neither empty nor a comment.
 std::string_view first_line(std::string_view text) {
@@ -49,41 +42,33 @@ bool is_value(std::string_view word) {
 std::string no_table(std::string_view text) {
   const auto line = first_line(text);
   if (line.starts_with('<')) {
-    const auto head = lower(text.substr(0, k_looked_at));
+    const auto head = lower_case(text.substr(0, k_looked_at));
     if (contains(head, "<gpx"))
       return "GPX is no table: write its points as CSV with time, lat, lon and alt, or give the log of the "
              "receiver itself (NMEA, UBX, .pos)";
     if (contains(head, "<kml"))
       return "KML is no table: anchord plan import reads plans of it; write the points of a track as CSV "
-             "with "
-             "time, lat, lon and alt";
+             "with time, lat, lon and alt";
     return "XML is no table: write it as CSV with a header line of names";
   }
   if (line.starts_with('{') || line.starts_with('['))
     return "JSON is no table: write it as CSV with a header line of names; anchord decode FILE > track.csv "
-           "reads "
-           "JSON of gpsd";
+           "reads JSON of gpsd";
   if (line.starts_with('$'))
     return "a log of NMEA is no table: the command line reads it as --track, and anchord decode FILE > "
-           "track.csv "
-           "makes one of it";
+           "track.csv makes one of it";
   const auto words = words_of(line);
   const auto n_values = std::ranges::count_if(words, is_value);
   if (words.size() > 1 && is_value(words.front()) && 2 * static_cast<std::size_t>(n_values) >= words.size())
     return "the first line has numbers; a header line with names is needed: write one above it, or let "
-           "anchord "
-           "decode FILE > track.csv read it where it has lines of LLH (Emlid, RTKLIB)";
+           "anchord decode FILE > track.csv read it where it has lines of LLH (Emlid, RTKLIB)";
   return "";
 }
 
 char take_separator_line(std::string_view& text) {
   const auto end = text.find('\n');
-  auto line = text.substr(0, end);
-  if (line.ends_with('\r')) line.remove_suffix(1);
-  if (line.size() == 7 && line.starts_with('"') && line.ends_with('"')) line = line.substr(1, 5);
-  if (line.size() != 5 || lower(line.substr(0, 4)) != "sep=") return '\0';
-  const char separator = line[4];
-  text.remove_prefix(end == std::string_view::npos ? text.size() : end + 1);
+  const char separator = separator_named_by(text.substr(0, end));
+  if (separator != '\0') text.remove_prefix(end == std::string_view::npos ? text.size() : end + 1);
   return separator;
 }
 

@@ -84,13 +84,12 @@ class TableReader {
         line.find('\0') != std::string_view::npos)
       return make_error(Errc::bad_frame,
                         file_ + ": UTF-16, as Excel's \"Unicode text\" is: save it as CSV UTF-8");
-    char separator = 0;
-    if (line.starts_with("sep=") && line.size() == 5) {  // of Excel, above the header
-      separator = line[4];
+    char separator = separator_named_by(line);
+    if (separator != '\0') {
       BOOST_OUTCOME_TRY(const bool header, lines.next(line));
       if (!header) return make_error(Errc::bad_frame, file_ + ": a header line is needed below sep=");
     }
-    if (separator == 0) separator = separator_of(line);
+    if (separator == '\0') separator = separator_of(line);
     decimal_comma_ = separator != ',';
     out_.file_names.push_back(file_);
     CsvRecord record({separator});

@@ -24,7 +24,7 @@ double middle(std::vector<double> values) {
 }  // namespace
 
 std::string time_unit_warning(std::string_view name, std::span<const double> values) {
-  const std::string_view told = name.ends_with("_us") ? "us" : name.ends_with("_ms") ? "ms" : "s";
+  const std::string_view named = name.ends_with("_us") ? "us" : name.ends_with("_ms") ? "ms" : "s";
   std::vector<double> times, steps;
   for (const double v : values) {
     if (!std::isfinite(v)) continue;
@@ -38,11 +38,11 @@ std::string time_unit_warning(std::string_view name, std::span<const double> val
     const double s = typical / unit.per_s;
     // A clock that began with the device may read like years of another unit; ranges come within the minute.
     if (s < k_year_2000_s || s > k_year_2100_s || step / unit.per_s > 60) continue;
-    if (unit.word == told) return {};
-    return begin + std::string(unit.word) + " since 1970, not " + std::string(told) + ": name the column t_" +
-           std::string(unit.word) + ", or convert it";
+    if (unit.word == named) return {};
+    return begin + std::string(unit.word) + " since 1970, not " + std::string(named) +
+           ": name the column t_" + std::string(unit.word) + ", or convert it";
   }
-  if (told == "us" && std::ranges::any_of(times, [](double v) { return v != std::floor(v); }))
+  if (named == "us" && std::ranges::any_of(times, [](double v) { return v != std::floor(v); }))
     return begin +
            "no whole microseconds: seconds or milliseconds? Name the column t_s or t_ms, or convert it";
   return {};

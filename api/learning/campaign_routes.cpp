@@ -195,8 +195,8 @@ Result<SamplePage> sample_page(CampaignStore& store, const ModelRegistry::Active
 
 constexpr const char* k_sample_header =
     "id,t_us,seq,environment,setting,true_distance_m,los,heading_deg,height_difference_m,material,thickness_"
-    "m,truth_sigma_m,"
-    "range_m,rx_dbm,fp_dbm,fp_amp1,fp_amp2,fp_amp3,cir_power,preamble_count,std_noise,max_noise,fp_index\r\n";
+    "m,truth_sigma_m,range_m,rx_dbm,fp_dbm,fp_amp1,fp_amp2,fp_amp3,cir_power,preamble_count,std_noise,max_"
+    "noise,fp_index\r\n";
 /// By the names an import knows, so that what is taken out can be brought in again.
 std::string sample_csv(const CampaignStore::StoredSample& s) {
   const auto number = [](const auto& v) { return v ? to_wire(Ordered(*v)) : std::string(); };

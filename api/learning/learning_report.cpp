@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
+#include "api/formats/cells.hpp"
 #include "api/learning/training_parts.hpp"
 #include "core/base/to_wire.hpp"
 
@@ -57,15 +58,7 @@ std::string text_of(const RowReport& r) {
   if (!r.label.empty() && !r.los_value.empty())
     out += "\nclass: " + r.los_value + " of column " + r.label + " is LOS";
   if (!r.group_by.empty()) out += "\nplaces by: " + r.group_by;
-  std::string unused;
-  for (const auto& name : r.unused) {
-    if (unused.size() > 400) {
-      unused += ", ...";
-      break;
-    }
-    unused += (unused.empty() ? "" : ", ") + name;
-  }
-  if (!unused.empty()) out += "\ncolumns not used: " + unused;
+  if (const auto unused = listed_briefly(r.unused); !unused.empty()) out += "\ncolumns not used: " + unused;
   if (!r.warning.empty()) out += "\nwarning: " + r.warning;
   for (const auto& warning : r.warnings) out += "\nwarning: " + warning;
   return out + "\n";

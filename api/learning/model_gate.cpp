@@ -212,8 +212,8 @@ GateReport gate_of(const ml::Model& candidate, const ml::Model* current, const G
   if (apart)
     checks.fail({"same_rows", std::nullopt, std::nullopt, true, "none"},
                 "there are no rows of single ranges, unused in the training of both models, to compare it "
-                "with the active model: freeze a "
-                "data set with aggregation none that holds out places, or promote it with a reason");
+                "with the active model: freeze a data set with aggregation none that holds out places, or "
+                "promote it with a reason");
   if (basis == "none") {
     checks.fail({"evaluated", std::nullopt, std::nullopt, true, basis},
                 "the model comes from another server, and no data set of this server has " +

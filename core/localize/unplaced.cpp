@@ -47,8 +47,7 @@ std::string outside(const FlightRows& rows) {
   if (ratio > 100 || ratio < 0.01) why += ", and t_s is in seconds";
   why +=
       "; in tables of other programs --track-time and --range-time (Times of the track, of the ranges) say "
-      "unit "
-      "and clock, rows sent to /fixes and /ranges have t_us in microseconds";
+      "unit and clock, rows sent to /fixes and /ranges have t_us in microseconds";
   return why;
 }
 

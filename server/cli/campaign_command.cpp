@@ -3,6 +3,7 @@
 #include <memory>
 
 #include "api/formats/campaign.hpp"
+#include "api/formats/cells.hpp"
 #include "core/base/text.hpp"
 #include "core/base/whole_file.hpp"
 #include "server/cli/commands.hpp"
@@ -12,8 +13,6 @@
 
 namespace anchord::cli {
 namespace {
-
-constexpr std::size_t k_most_unused = 400;  // characters
 
 struct CampaignArguments {
   std::string file, out, environment, material, site, label, los_value;
@@ -50,14 +49,7 @@ void print_report(const api::CampaignReport& r, std::FILE* to) {
   for (const auto& [column, value] : r.classes)
     std::fprintf(to, "  class: %s of column %s is LOS\n", printable(value).c_str(),
                  printable(column).c_str());
-  std::string unused;
-  for (const auto& name : r.unused) {
-    if (unused.size() > k_most_unused) {
-      unused += ", ...";
-      break;
-    }
-    unused += (unused.empty() ? "" : ", ") + name;
-  }
+  const std::string unused = api::listed_briefly(r.unused);
   if (!unused.empty()) std::fprintf(to, "  columns not used: %s\n", printable(unused).c_str());
   for (const auto& warning : r.warnings) std::fprintf(to, "  warning: %s\n", printable(warning).c_str());
   for (const auto& odd : r.oddities) std::fprintf(to, "  warning: %s\n", printable(odd).c_str());

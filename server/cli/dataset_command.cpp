@@ -3,6 +3,7 @@
 #include <map>
 #include <memory>
 
+#include "api/formats/cells.hpp"
 #include "api/learning/freeze_rows.hpp"
 #include "api/learning/labelled_dataset.hpp"
 #include "core/base/text.hpp"
@@ -34,9 +35,8 @@ void print_columns(const api::LabelledTable& table) {
   if (!table.los_value.empty())
     std::printf("class: %s of column %s is LOS\n", printable(table.los_value).c_str(),
                 printable(table.label_column).c_str());
-  std::string unused;
-  for (const auto& name : table.unused) unused += (unused.empty() ? "" : ", ") + name;
-  if (!unused.empty()) std::printf("columns not used: %s\n", printable(unused.substr(0, 400)).c_str());
+  if (const auto unused = api::listed_briefly(table.unused); !unused.empty())
+    std::printf("columns not used: %s\n", printable(unused).c_str());
   for (const auto& warning : table.warnings) std::printf("warning: %s\n", printable(warning).c_str());
 }
 

@@ -167,8 +167,7 @@ constexpr std::array k_settings{
             }},
     Setting{"heights",
             "Reference of the heights: ellipsoidal, EPSG:5773 (mean sea level, EGM96) or another vertical "
-            "system, "
-            "metres of the geoid there, or column",
+            "system, metres of the geoid there, or column",
             [](const std::string& text, ForeignOptions& out) -> Result<void> {
               out.heights = text;
               SourceCrsSpec checked;

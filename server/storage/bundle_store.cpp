@@ -27,8 +27,7 @@ constexpr const char* k_revisions = "SELECT number FROM revision";
 constexpr const char* k_frame_named = "SELECT id FROM local_frame WHERE name = ?1";
 constexpr const char* k_count_fixes_anew =
     "INSERT INTO mission_fixes (mission_key, n_fixes) SELECT mission_key, count(*) FROM fix WHERE "
-    "mission_key = "
-    "?1 GROUP BY mission_key";
+    "mission_key = ?1 GROUP BY mission_key";
 
 /// One import, inside one transaction.
 class Reader {

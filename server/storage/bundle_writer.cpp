@@ -10,10 +10,8 @@ namespace {
 
 constexpr const char* k_sites =
     "SELECT s.id FROM site s WHERE s.id IN (SELECT m.site_id FROM mission m WHERE m.mission_key = ?1) OR "
-    "s.id "
-    "IN (SELECT a.site_id FROM anchor a JOIN device_seen d ON d.network_id = a.network_id WHERE "
-    "d.mission_key "
-    "= ?1 AND d.kind = 1)";
+    "s.id IN (SELECT a.site_id FROM anchor a JOIN device_seen d ON d.network_id = a.network_id WHERE "
+    "d.mission_key = ?1 AND d.kind = 1)";
 constexpr const char* k_plans = "SELECT id, site_id FROM plan";
 constexpr const char* k_procedure = "SELECT state_json FROM mission_procedure WHERE mission_key = ?1";
 constexpr const char* k_models = "SELECT id FROM model";

@@ -10,16 +10,12 @@
 namespace anchord::sql {
 namespace {
 
-constexpr const char* k_timed =
+const std::string k_columns =
     "SELECT sample_id, t_ns, seq, range_m, rx_dbm, fp_dbm, fp_amp1, fp_amp2, fp_amp3, cir_power, "
     "preamble_count, std_noise, max_noise, fp_index, EXISTS (SELECT 1 FROM campaign_cir c WHERE c.sample_id "
     "= "
-    "campaign_sample.sample_id) FROM campaign_sample WHERE setting_key = ?1 AND t_ns >= ?2 AND t_ns <= ?3";
-constexpr const char* k_untimed =
-    "SELECT sample_id, t_ns, seq, range_m, rx_dbm, fp_dbm, fp_amp1, fp_amp2, fp_amp3, cir_power, "
-    "preamble_count, std_noise, max_noise, fp_index, EXISTS (SELECT 1 FROM campaign_cir c WHERE c.sample_id "
-    "= "
-    "campaign_sample.sample_id) FROM campaign_sample WHERE setting_key = ?1 AND t_ns IS NULL";
+    "campaign_sample.sample_id) FROM campaign_sample WHERE setting_key = ?1 AND t_ns ";
+const std::string k_timed = k_columns + ">= ?2 AND t_ns <= ?3", k_untimed = k_columns + "IS NULL";
 constexpr const char* k_cir =
     "SELECT dt_ps, first_path_idx, preamble_count, re_im FROM campaign_cir WHERE "
     "sample_id = ?1";
@@ -54,7 +50,8 @@ KnownSamples::KnownSamples(Connection& connection, std::int64_t setting_key,
   if (untimed) read(k_untimed, setting_key, {});
 }
 
-void KnownSamples::read(const char* text, std::int64_t setting_key, const std::vector<std::int64_t>& bounds) {
+void KnownSamples::read(const std::string& text, std::int64_t setting_key,
+                        const std::vector<std::int64_t>& bounds) {
   Query query(connection_, text);
   query << setting_key;
   for (const auto bound : bounds) query << bound;

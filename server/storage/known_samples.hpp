@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <map>
 #include <set>
+#include <string>
 #include <unordered_map>
 #include <vector>
 
@@ -33,7 +34,7 @@ class KnownSamples {
     bool has_cir{};
   };
   bool agrees(const Stored& stored, const CampaignSample& row);
-  void read(const char* text, std::int64_t setting_key, const std::vector<std::int64_t>& bounds);
+  void read(const std::string& text, std::int64_t setting_key, const std::vector<std::int64_t>& bounds);
 
   Connection& connection_;
   std::unordered_map<std::uint64_t, std::vector<Stored>> stored_;  ///< by microsecond, else by range

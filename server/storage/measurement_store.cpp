@@ -172,10 +172,8 @@ constexpr const char* k_fix_class =
 /// position. A class that a flight hardly had costs what it had, not a look at every range.
 constexpr const char* k_spans_of_class =
     "(SELECT f.fix_id AS span_id, f.t_ns AS from_ns, (SELECT ifnull(min(g.t_ns), f.t_ns + 2000000001) FROM "
-    "fix "
-    "g WHERE g.mission_key = f.mission_key AND g.t_ns > f.t_ns AND g.t_ns <= f.t_ns + 2000000000) AS "
-    "until_ns "
-    "FROM fix f WHERE f.mission_key = ?1 AND NOT EXISTS (SELECT 1 FROM fix g WHERE g.mission_key = "
+    "fix g WHERE g.mission_key = f.mission_key AND g.t_ns > f.t_ns AND g.t_ns <= f.t_ns + 2000000000) AS "
+    "until_ns FROM fix f WHERE f.mission_key = ?1 AND NOT EXISTS (SELECT 1 FROM fix g WHERE g.mission_key = "
     "f.mission_key AND g.t_ns = f.t_ns AND ifnull(g.seq, -1) > ifnull(f.seq, -1)) AND f.fix_class = ";
 
 /// What a page or a count selects from; the parameters appear in the order in which bind_filter() binds them.

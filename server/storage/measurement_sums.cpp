@@ -6,14 +6,11 @@ namespace anchord::sql {
 namespace {
 
 constexpr const char* k_note_device =
-    "INSERT INTO device_seen (mission_key, network_id, kind, first_t_ns, last_t_ns, n_ranges) "
-    "VALUES (?1, ?2, ?3, ?4, ?5, ?6) "
-    "ON CONFLICT (mission_key, network_id, kind) DO UPDATE SET "
-    "first_t_ns = CASE WHEN excluded.first_t_ns < device_seen.first_t_ns THEN excluded.first_t_ns "
-    "ELSE device_seen.first_t_ns END, "
-    "last_t_ns = CASE WHEN excluded.last_t_ns > device_seen.last_t_ns THEN excluded.last_t_ns "
-    "ELSE device_seen.last_t_ns END, "
-    "n_ranges = device_seen.n_ranges + excluded.n_ranges";
+    "INSERT INTO device_seen (mission_key, network_id, kind, first_t_ns, last_t_ns, n_ranges) VALUES (?1, "
+    "?2, ?3, ?4, ?5, ?6) ON CONFLICT (mission_key, network_id, kind) DO UPDATE SET "
+    "first_t_ns = CASE WHEN excluded.first_t_ns < device_seen.first_t_ns THEN excluded.first_t_ns ELSE "
+    "device_seen.first_t_ns END, last_t_ns = CASE WHEN excluded.last_t_ns > device_seen.last_t_ns THEN "
+    "excluded.last_t_ns ELSE device_seen.last_t_ns END, n_ranges = device_seen.n_ranges + excluded.n_ranges";
 constexpr const char* k_note_fixes =
     "INSERT INTO mission_fixes (mission_key, n_fixes) VALUES (?1, ?2) "
     "ON CONFLICT (mission_key) DO UPDATE SET n_fixes = mission_fixes.n_fixes + excluded.n_fixes";

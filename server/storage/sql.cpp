@@ -25,13 +25,19 @@ Error to_error(const SqlError& error) {
   return make_error(Errc::internal, error.what());
 }
 
-Connection::Keys Connection::insert_rows(const BulkTable& table, std::size_t n, const BindRow& bind) {
+std::string insert_text(const BulkTable& table, std::size_t n_rows) {
   std::string text =
-      "INSERT INTO " + std::string(table.name) + " (" + std::string(table.columns) + ") VALUES (?1";
-  const auto columns = std::ranges::count(table.columns, ',') + 1;
-  for (std::ptrdiff_t i = 2; i <= columns; ++i) text += ", ?" + std::to_string(i);
-  text += table.key.empty() ? ")" : ") ON CONFLICT DO NOTHING";
-  Query query(*this, text);
+      "INSERT INTO " + std::string(table.name) + " (" + std::string(table.columns) + ") VALUES ";
+  const auto n_columns = static_cast<std::size_t>(std::ranges::count(table.columns, ',')) + 1;
+  for (std::size_t i = 0; i < n_rows * n_columns; ++i) {
+    if (i % n_columns == 0) text += i == 0 ? "(" : "), (";
+    text += (i % n_columns == 0 ? "?" : ", ?") + std::to_string(i + 1);
+  }
+  return text + ')';
+}
+
+Connection::Keys Connection::insert_rows(const BulkTable& table, std::size_t n, const BindRow& bind) {
+  Query query(*this, insert_text(table, 1) + (table.key.empty() ? "" : " ON CONFLICT DO NOTHING"));
   Keys keys;
   if (!table.key.empty()) keys.reserve(n);
   for (std::size_t row = 0; row < n; ++row) {

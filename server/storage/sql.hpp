@@ -81,6 +81,9 @@ struct BulkTable {
   std::string_view key{};    ///< integer key that the database gives out; empty: there is none
 };
 
+/// "INSERT INTO t (a, b) VALUES (?1, ?2), (?3, ?4)": so many rows of the table.
+std::string insert_text(const BulkTable& table, std::size_t n_rows);
+
 /// One connection, used by one thread at a time.
 class Connection {
  public:

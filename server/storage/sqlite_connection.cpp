@@ -5,7 +5,6 @@
 #include <SQLiteCpp/Statement.h>
 #include <sqlite3.h>
 
-#include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <unordered_map>
@@ -150,19 +149,6 @@ void count_no_memory() {
   static_cast<void>(once);
 }
 
-/// An INSERT of `n` rows that fails as a whole where there is a row like one of them.
-std::string insert_text(const BulkTable& table, std::size_t n) {
-  std::string text =
-      "INSERT INTO " + std::string(table.name) + " (" + std::string(table.columns) + ") VALUES ";
-  const auto columns = static_cast<std::size_t>(std::ranges::count(table.columns, ',')) + 1;
-  for (std::size_t row = 0; row < n; ++row) {
-    text += row == 0 ? "(" : ", (";
-    for (std::size_t column = 0; column < columns; ++column) text += column == 0 ? "?" : ", ?";
-    text += ')';
-  }
-  return text;
-}
-
 /// A prepared statement is found by its text without a copy of that.
 struct TextHash {
   using is_transparent = void;
@@ -252,6 +238,7 @@ Connection::Keys SqliteConnection::insert_rows(const BulkTable& table, std::size
   if (!table.key.empty()) keys.reserve(n);
   std::size_t from = 0;
   if (n >= k_rows_together) {
+    // Without ON CONFLICT it fails as a whole where there is a row like one of them.
     Query query(*this, insert_text(table, k_rows_together));
     for (; n - from >= k_rows_together; from += k_rows_together) {
       query.again();

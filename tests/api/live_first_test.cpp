@@ -1,36 +1,14 @@
 // A flight never waits for a disk: rows are live as they come, stored behind, and each is in the flight once,
 // however often it is sent.
-#include <sys/resource.h>
-
-#include <csignal>
-
 #include "api/stream/hub.hpp"
 #include "app_fixture.hpp"
 #include "core/ports/devices.hpp"
+#include "tests/full_disk.hpp"
 
 namespace anchord::test::live_first_test {
 namespace {
 
 constexpr std::int64_t k_start_us = 1'777'889'472'000'000;
-
-/// No file of this process grows while it lives, as on a full disk.
-class FullDisk {
- public:
-  FullDisk() {
-    former_handler_ = std::signal(SIGXFSZ, SIG_IGN);
-    ::getrlimit(RLIMIT_FSIZE, &former_);
-    const rlimit none{0, former_.rlim_max};
-    ::setrlimit(RLIMIT_FSIZE, &none);
-  }
-  ~FullDisk() {
-    ::setrlimit(RLIMIT_FSIZE, &former_);
-    std::signal(SIGXFSZ, former_handler_);
-  }
-
- private:
-  rlimit former_{};
-  void (*former_handler_)(int){};
-};
 
 /// Counts the positions that live flights tell of.
 struct Positions final : api::HubListener {

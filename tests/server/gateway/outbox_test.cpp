@@ -1,13 +1,12 @@
 #include "server/gateway/outbox.hpp"
 
 #include <gtest/gtest.h>
-#include <sys/resource.h>
 
-#include <csignal>
 #include <fstream>
 #include <random>
 #include <thread>
 
+#include "tests/full_disk.hpp"
 #include "tests/server/storage/child.hpp"
 #include "tests/server/storage/scratch_dir.hpp"
 
@@ -87,27 +86,6 @@ TEST(GatewayOutbox, RefusesWhatComesWhenItIsFullAndTakesAgainWhenRowsHaveLeft) {
   EXPECT_TRUE(outbox->keep({batch(k_first, body)}));
 }
 
-/// No file of this process grows while it lives, as on a disk that is full.
-class FullDisk {
- public:
-  FullDisk() {
-    former_handler_ = std::signal(SIGXFSZ, SIG_IGN);
-    ::getrlimit(RLIMIT_FSIZE, &former_);
-    const rlimit none{0, former_.rlim_max};
-    ::setrlimit(RLIMIT_FSIZE, &none);
-  }
-  ~FullDisk() {
-    ::setrlimit(RLIMIT_FSIZE, &former_);
-    std::signal(SIGXFSZ, former_handler_);
-  }
-  FullDisk(const FullDisk&) = delete;
-  FullDisk& operator=(const FullDisk&) = delete;
-
- private:
-  rlimit former_{};
-  void (*former_handler_)(int){};
-};
-
 TEST(GatewayOutbox, OnAFullDiskRowsLeaveFromMemoryAndWhatLeftIsNotSentAgain) {
   ScratchDir dir;
   const auto outbox = opened(dir.path());
@@ -115,7 +93,7 @@ TEST(GatewayOutbox, OnAFullDiskRowsLeaveFromMemoryAndWhatLeftIsNotSentAgain) {
   const auto kept = outbox->newest(0, 100).value().batches;
   ASSERT_EQ(kept.size(), 2u);
   {
-    const FullDisk full;
+    const test::FullDisk full;
     ASSERT_FALSE(outbox->keep({batch(k_first, "c\n")}));
     ASSERT_TRUE(outbox->hold({batch(k_first, "c\n"), batch(unassigned(), "d\n"), batch(k_first, "e\n")}));
     EXPECT_EQ(outbox->state().rows, 5u);
@@ -147,7 +125,7 @@ TEST(GatewayOutbox, WhatWasInMemoryIsThereAfterARestartOnceTheDiskTookIt) {
   {
     const auto outbox = opened(dir.path());
     {
-      const FullDisk full;
+      const test::FullDisk full;
       ASSERT_TRUE(outbox->hold({batch(k_first, "a\nb\n", 2)}));
       EXPECT_TRUE(outbox->hold({batch(k_first, std::string(Outbox::k_most_held_bytes / 2, 'x'))}));
       EXPECT_FALSE(outbox->hold({batch(k_first, std::string(Outbox::k_most_held_bytes / 2, 'x'))}))
