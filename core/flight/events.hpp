@@ -30,7 +30,7 @@ struct AnchorStatusChanged {
 };
 struct AnchorEstimated {
   Estimate estimate;
-  std::optional<double> models_moved_m{};  ///< LiveFlight::uncorrected_shift_m
+  std::optional<double> models_moved_m{};  ///< LiveFlight::model_shift
 };
 /// The first position of this mission that was rejected for this reason; later ones are counted.
 struct FixRejected {

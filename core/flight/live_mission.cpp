@@ -107,8 +107,9 @@ void LiveMission::announce_estimate(Estimate estimate) {
   if (is_new) events_.emplace_back(AnchorFound{estimate.anchor, !reading_});
   if (changed && !reading_ && (status == "converged" || status == "ambiguous"))
     events_.emplace_back(AnchorStatusChanged{estimate.anchor, status, estimate.reason});
-  const auto moved_m = live_.uncorrected_shift_m(estimate.anchor);
-  watch_.note_moved(estimate.anchor, moved_m, estimate.h95_m);
+  const auto shift = live_.model_shift(estimate.anchor);
+  const auto moved_m = shift ? std::optional(shift->m) : std::nullopt;
+  watch_.note_moved(estimate.anchor, moved_m, shift ? shift->known_to_m : 0);
   events_.emplace_back(AnchorEstimated{std::move(estimate), moved_m});
 }
 

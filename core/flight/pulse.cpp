@@ -7,7 +7,7 @@ constexpr std::size_t k_looks = 10;
 // One range in five of the newest fifty: single odd ones are what withholding is for.
 constexpr std::size_t k_judged = 50, k_many_withheld = 10;
 // A wall moves no anchor by more, and no anchor so far that its own uncertainty could.
-constexpr double k_moved_m = 3, k_moved_h95 = 3;
+constexpr double k_moved_m = 3, k_moved_regions = 3;
 
 }  // namespace
 
@@ -48,8 +48,8 @@ void FlightWatch::note_model(std::string_view withheld) {
   pulse_.models_withheld = n >= k_many_withheld ? why : std::string_view{};
 }
 
-void FlightWatch::note_moved(NetworkId anchor, std::optional<double> moved_m, double h95_m) {
-  const bool far = moved_m && *moved_m > k_moved_m && *moved_m > k_moved_h95 * h95_m;
+void FlightWatch::note_moved(NetworkId anchor, std::optional<double> moved_m, double known_to_m) {
+  const bool far = moved_m && *moved_m > k_moved_m && *moved_m > k_moved_regions * known_to_m;
   if (far == moved_.contains(anchor)) return;
   if (far)
     moved_.insert(anchor);

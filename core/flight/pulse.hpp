@@ -41,8 +41,9 @@ class FlightWatch {
   void note_lag(double lag_s, double sigma_s);
   /// A range that models judged; `withheld`: why their correction was not applied, empty where it was.
   void note_model(std::string_view withheld);
-  /// How far the models move an anchor whose position is known to `h95_m`.
-  void note_moved(NetworkId anchor, std::optional<double> moved_m, double h95_m);
+  /// How far the models move an anchor, and to how much its place is known without them (95 %). With them it
+  /// would hide what they do: ranges that are metres wrong agree badly, and the region grows.
+  void note_moved(NetworkId anchor, std::optional<double> moved_m, double known_to_m);
   /// The flight as it stands. Call it about once a second: a flight counts as happening now once ten looks
   /// saw its measured time pass about as fast as ours, and no longer when it runs ahead (an upload, a fast
   /// replay). One that falls silent stays what it was: silence is what the alarms are about.

@@ -320,13 +320,17 @@ std::vector<Estimate> LiveFlight::estimates() const {
   return all;
 }
 
-std::optional<double> LiveFlight::uncorrected_shift_m(NetworkId anchor) const {
+std::optional<LiveFlight::ModelShift> LiveFlight::model_shift(NetworkId anchor) const {
   const auto raw = state_->uncorrected.find(anchor);
   if (raw == state_->uncorrected.end()) return std::nullopt;
   const auto with = state_->anchors.at(anchor).estimate(state_->track.frame()),
              without = raw->second.estimate(state_->track.frame());
   if (!with.best || !without.best) return std::nullopt;
-  return (with.best->position.m - without.best->position.m).norm();
+  ModelShift out{std::numeric_limits<double>::infinity(), std::hypot(without.h95_m, without.v95_m)};
+  for (const auto* here : {&with.best, &with.mirror})
+    for (const auto* there : {&without.best, &without.mirror})
+      if (*here && *there) out.m = std::min(out.m, ((*here)->position.m - (*there)->position.m).norm());
+  return out;
 }
 
 std::optional<Wgs84> LiveFlight::origin() const {

@@ -89,9 +89,14 @@ class LiveFlight {
   std::vector<Estimate> take_estimates();
   /// Newest answer of every anchor heard.
   std::vector<Estimate> estimates() const;
-  /// How far an anchor stands from where the same ranges put it without the models. Nothing where no range of
-  /// it was corrected.
-  std::optional<double> uncorrected_shift_m(NetworkId anchor) const;
+  /// How far an anchor stands from where the same ranges put it without the models. A mirror solution is as
+  /// good as its twin: the nearest two places of both are compared.
+  struct ModelShift {
+    double m{};
+    double known_to_m{};  ///< 95 %, horizontally and vertically together, of the place without the models
+  };
+  /// Nothing where no range of it was corrected.
+  std::optional<ModelShift> model_shift(NetworkId anchor) const;
   /// Of the ENU numbers; none in a local frame or before the first good fix. Another one when the first
   /// positions turned out to be no part of the flight: every estimate is in the new one then.
   std::optional<Wgs84> origin() const;

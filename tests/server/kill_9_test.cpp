@@ -20,7 +20,7 @@
 #include <vector>
 
 #include "tests/paths.hpp"
-#include "tests/server/storage/scratch_dir.hpp"
+#include "tests/scratch_dir.hpp"
 
 namespace anchord::kill_9_test {
 namespace {

@@ -7,15 +7,16 @@
 #include <fstream>
 #include <iterator>
 
+#include "tests/scratch_dir.hpp"
+
 namespace anchord::whole_file_test {
 namespace {
 
 namespace fs = std::filesystem;
 
 struct WholeFiles : testing::Test {
-  fs::path folder = fs::path(testing::TempDir()) / "anchord whole files";
-  void SetUp() override { fs::create_directories(folder); }
-  void TearDown() override { fs::remove_all(folder); }
+  ScratchDir scratch;  // tests run side by side, each in a folder of its own
+  fs::path folder = scratch.path();
   static std::string read(const fs::path& file) {
     std::ifstream in(file, std::ios::binary);
     return {std::istreambuf_iterator<char>(in), {}};

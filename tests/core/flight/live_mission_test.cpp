@@ -258,6 +258,50 @@ TEST(LiveMission, AlarmsKnowOfCorrectionsThatMoveAnchorsAndOfThoseNotApplied) {
     EXPECT_EQ(before[i].best->position.m, after[i].best->position.m);
 }
 
+/// A flight of one height cannot tell an anchor from its mirror image: that a small correction makes the
+/// other one the better is no work of the model's.
+TEST(LiveMission, SmallCorrectionsMoveNoAnchorAlsoWhereItsMirrorFitsAsWell) {
+  MadeFlight level;
+  level.height_swing_m = 0;
+  for (const std::uint64_t seed : {1, 2, 3}) {
+    level.seed = seed;
+    const auto data = make_flight(level);
+    LiveMission mission(setup_of(data));
+    std::string named;
+    int n = 0;
+    for (auto row : stream(data)) {
+      if (auto* judged = std::get_if<flight::PredictedRange>(&row)) {
+        judged->model.emplace();
+        judged->model->bias_m = 0.25 + 0.15 * std::sin(0.7 * n);
+      }
+      mission.add(row);
+      if (++n % 20 != 0) continue;
+      mission.settle();
+      named += mission.watch().look(mission.state().time, {}).models_moved;
+    }
+    EXPECT_EQ(named, "") << "seed " << seed;
+  }
+}
+
+/// A bias that all ranges have is found by the flight itself; one that grows with the range moves the
+/// anchors, and makes them agree so badly that their own regions would excuse it.
+TEST(LiveMission, CorrectionsThatAreMetresWrongNameEveryAnchorThatTheyMove) {
+  const auto data = make_flight(turning());
+  LiveMission mission(setup_of(data));
+  for (auto row : stream(data)) {
+    if (auto* judged = std::get_if<flight::PredictedRange>(&row)) {
+      judged->model.emplace();
+      judged->model->bias_m = -0.4 * judged->range.distance_m;
+    }
+    mission.add(row);
+  }
+  mission.finish();
+  mission.settle();
+  const std::string moved(mission.watch().look(mission.state().time, {}).models_moved);
+  for (const auto& estimate : mission.estimates())
+    EXPECT_NE(moved.find(to_string(estimate.anchor)), std::string::npos) << moved;
+}
+
 /// What was stored is counted and estimated, and tells of nothing that happened then.
 TEST(LiveMission, ReadingWhatWasStoredTellsTheEstimatesAlone) {
   const auto data = make_flight(MadeFlight{});

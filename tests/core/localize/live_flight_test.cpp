@@ -78,11 +78,11 @@ TEST(LiveFlight, TakesAModelsCorrectionOffAndKeepsTheAnswerWithoutIt) {
   for (std::size_t i = 0; i < with.size(); ++i) {
     ASSERT_TRUE(with[i].best && without[i].best);
     EXPECT_LT((with[i].best->position.m - without[i].best->position.m).norm(), 1e-6);
-    const auto moved = judged.uncorrected_shift_m(with[i].anchor);
+    const auto moved = judged.model_shift(with[i].anchor);
     EXPECT_EQ(moved.has_value(), with[i].anchor == anchor);
   }
-  EXPECT_GT(*judged.uncorrected_shift_m(anchor), 0.05);
-  EXPECT_FALSE(plain.uncorrected_shift_m(anchor));
+  EXPECT_GT(judged.model_shift(anchor)->m, 0.05);
+  EXPECT_FALSE(plain.model_shift(anchor));
 }
 
 TEST(LiveFlight, DecidesARangeOnceTheFixAfterItHasCome) {

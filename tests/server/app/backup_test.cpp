@@ -4,8 +4,8 @@
 #include "core/ports/mission_store.hpp"
 #include "server/runtime/backup_keeper.hpp"
 #include "server/storage/sqlite_database.hpp"
+#include "tests/scratch_dir.hpp"
 #include "tests/server/app/app_fixture.hpp"
-#include "tests/server/storage/scratch_dir.hpp"
 
 namespace anchord::test::backup_test {
 namespace {

@@ -9,7 +9,7 @@
 #include <set>
 
 #include "server/gateway/row_lines.hpp"
-#include "tests/server/storage/scratch_dir.hpp"
+#include "tests/scratch_dir.hpp"
 
 namespace anchord::gateway::delivery_test {
 namespace {

@@ -7,8 +7,8 @@
 #include <thread>
 
 #include "tests/full_disk.hpp"
+#include "tests/scratch_dir.hpp"
 #include "tests/server/storage/child.hpp"
-#include "tests/server/storage/scratch_dir.hpp"
 
 namespace anchord::gateway::outbox_test {
 namespace {

@@ -6,7 +6,7 @@
 #include <fstream>
 #include <sstream>
 
-#include "tests/server/storage/scratch_dir.hpp"
+#include "tests/scratch_dir.hpp"
 
 namespace anchord::server::chromium_pdf_test {
 namespace {

@@ -4,11 +4,14 @@
 
 #include <fstream>
 
+#include "tests/scratch_dir.hpp"
+
 namespace anchord::server::token_file_test {
 namespace {
 
 Result<std::string> read(const std::string& text) {
-  const auto file = std::filesystem::path(testing::TempDir()) / "anchord a token";
+  const ScratchDir folder;
+  const auto file = folder.path() / "a token";
   std::ofstream(file, std::ios::binary) << text;
   return token_in(file);
 }

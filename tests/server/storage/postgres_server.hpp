@@ -17,7 +17,7 @@
 #include <vector>
 
 #include "server/storage/postgres_connection.hpp"
-#include "tests/server/storage/scratch_dir.hpp"
+#include "tests/scratch_dir.hpp"
 
 namespace anchord {
 

@@ -10,7 +10,7 @@
 #include "core/ports/measurement_store.hpp"
 #include "core/ports/mission_store.hpp"
 #include "server/storage/sqlite_database.hpp"
-#include "tests/server/storage/scratch_dir.hpp"
+#include "tests/scratch_dir.hpp"
 
 namespace anchord {
 
