@@ -175,7 +175,7 @@ test('waypoints are spaced evenly and made denser, judged while they are drawn, 
       `Waypoint 4${(waypoints[3].height_above_ground_m - 2).toFixed(1)} m high${waypoints[3].height_above_ground_m.toFixed(1)} m high`,
     ],
   );
-  assert.equal(await id('conflict').locator('svg .only').count(), 2);
+  await eventually('both are drawn', async () => (await id('conflict').locator('svg .only').count()) === 2);
   assert.deepEqual(await violations(page), []);
   await picture(page, 'plan-conflict-light');
   await id('conflict').getByRole('button', { name: 'Keep mine, then save' }).click();
