@@ -56,7 +56,7 @@ Finding folder(const fs::path& dir) {
   std::error_code error;
   if (!fs::exists(dir, error))
     return {Level::warning, "data folder", fs::absolute(dir).string() + ": does not exist",
-            "it is created by the first 'anchord serve --data-dir " + dir.string() + "' makes it"};
+            "the first 'anchord serve --data-dir " + dir.string() + "' creates it"};
   if (!fs::is_directory(dir, error))
     return {Level::failed, "data folder", dir.string() + ": is not a folder",
             "give another one with --data-dir"};

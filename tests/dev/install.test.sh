@@ -94,10 +94,12 @@ seconds_of "removed, purged"
 # user, in a network of its own, on a root that is read-only but for /data and /tmp. What the package needed is installed here already;
 # tests/dev/fresh_root.test.sh begins with nothing.
 image=$(awk '/^FROM/ {n++} n == 2' "$root/.ci/Dockerfile" | sed -e ':a' -e '/\\$/{N;s/\\\n//;ta' -e '}')
+environment=()
 while read -r word rest; do
   case $word in
     RUN) attempt in_root bash -c "$rest" ; expect "RUN of .ci/Dockerfile" 0 '' ;;
     COPY) [[ $rest == --from=* ]] && install -D -m 0755 "$ANCHORD_BINARY" "$new/usr/local/bin/anchord" || cp "$root/${rest% *}" "$new${rest##* }" ;;
+    ENV) environment+=("$rest") ;;
     USER) user=$rest ;;
   esac
 done <<<"$image"
@@ -109,7 +111,7 @@ if mount --bind "$new" "$new" 2>/dev/null && unshare --net true 2>/dev/null; the
   mount -t proc proc "$new/proc" && mount -t tmpfs tmpfs "$new/tmp" && mount -t tmpfs -o "uid=${user%:*},gid=${user#*:},mode=0700" tmpfs "$new/data" &&
     mount -o remount,bind,ro "$new"
   attempt unshare --net bash -c 'ip link set lo up
-    run=(env -i /usr/sbin/chroot --userspec='"$user $new"')
+    run=(env -i '"${environment[*]}"' /usr/sbin/chroot --userspec='"$user $new"')
     "${run[@]}" '"$entry $(compose command)"' >'"$store"'/image.log 2>&1 & server=$!
     for _ in {1..200}; do "${run[@]}" '"$(compose healthcheck)"' 2>/dev/null && break; sleep 0.1; done
     "${run[@]}" '"$(compose healthcheck)"' && echo healthy; "${run[@]}" /usr/bin/id -u; "${run[@]}" /usr/bin/pdftoppm -v 2>&1 | head -n 1

@@ -231,7 +231,10 @@ test('a flight begins on the page, records what the devices measure, is finished
   await id('next-flight').click();
   await eventually('as before', async () => (await arm('Up').inputValue()) === '-0.28');
   assert.equal(await form.getByLabel('Kit').inputValue(), 'quad');
-  await eventually('its site once the sites are read', async () => (await form.getByLabel('Site').inputValue()) === site);
+  await eventually(
+    'its site once the sites are read',
+    async () => (await form.getByLabel('Site').inputValue()) === site,
+  );
   assert.match(await form.getByLabel('Name', { exact: true }).inputValue(), /^Flight \d{4}-\d\d-\d\d \d\d:\d\d$/);
   assert.ok(await id('begin-flight').isEnabled());
   assert.deepEqual(seen.errors, []);

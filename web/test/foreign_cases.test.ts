@@ -1,6 +1,7 @@
 import { readFileSync } from 'node:fs';
 import { expect, it } from 'vitest';
-import { guessed_ranges, guessed_track, NAMES, type Columns } from '../src/views/start/fields';
+import { guessed_ranges, guessed_track } from '../src/views/start/fields';
+import { NAMES, type Columns } from '../src/views/start/names';
 import {
   flight_of,
   guessed_reading,

@@ -25,6 +25,15 @@ test('a rest ends by itself, and by a short picture it is not made longer', () =
   expect(pace.rest_ms(920)).toBe(80);
   expect(pace.rest_ms(1200)).toBe(0);
 });
+test('whoever asks between the frame of a picture and its end waits for its rest', () => {
+  const pace = new Pace();
+  pace.begins(0);
+  expect(pace.rest_ms(20)).toBe(0); // joins it
+  pace.paints();
+  expect(pace.rest_ms(3000)).toBeGreaterThan(0);
+  pace.ends(3001);
+  expect(pace.rest_ms(3001)).toBe(1000);
+});
 test('what a person does is not kept waiting, and is answered with what was said before it', async () => {
   vi.useFakeTimers({ toFake: ['setTimeout', 'performance'] });
   const page = new EventTarget(),

@@ -9,23 +9,34 @@ const LONG_MS = 150,
 export class Pace {
   private begun_ms: number | null = null;
   private free_ms = -Infinity;
+  private painting = false;
   begins(now_ms: number): void {
     this.begun_ms ??= now_ms;
   }
+  /// Its frame has begun; style, layout and paint come after this and before the end.
+  paints(): void {
+    this.painting = this.begun_ms !== null;
+  }
   ends(now_ms: number): void {
+    this.painting = false;
     if (this.begun_ms === null) return;
     const took_ms = now_ms - this.begun_ms;
     this.begun_ms = null;
     if (took_ms > LONG_MS) this.free_ms = now_ms + Math.min(took_ms, LONGEST_REST_MS);
   }
+  /// A timer may come before the task that ends a picture, however long that took: whoever asks then asks again.
   rest_ms(now_ms: number): number {
-    return Math.max(0, this.free_ms - now_ms);
+    return this.painting ? 1 : Math.max(0, this.free_ms - now_ms);
   }
 }
 
 const pace = new Pace(),
   ended = new MessageChannel(); // a task of its own: it comes after style, layout and paint
 ended.port2.onmessage = () => pace.ends(performance.now());
+function painted(): void {
+  pace.paints();
+  ended.port1.postMessage(null);
+}
 
 /// Calls `draw` once the page had its time to read; another picture may end meanwhile and begin a rest of its own.
 function after_rest(draw: () => void): void {
@@ -49,7 +60,7 @@ export function pace_components(page: EventTarget = globalThis): void {
     if (!render) return;
     waiting = null;
     pace.begins(performance.now());
-    requestAnimationFrame(() => ended.port1.postMessage(null));
+    requestAnimationFrame(painted);
     render();
   };
   options.debounceRendering = (render) => {
@@ -76,7 +87,7 @@ export function next_picture(draw: (t_ms: number) => void): void {
   after_rest(() =>
     requestAnimationFrame((t_ms) => {
       pace.begins(performance.now());
-      ended.port1.postMessage(null);
+      painted();
       draw(t_ms);
     }),
   );

@@ -1,5 +1,5 @@
 /// Acceptance gates of the server as sentences with value, sign, limit and unit. Limits are the server's: the page has none. No DOM.
-import type { Gate } from '../api/anchors';
+import type { GateMsg as Gate } from '../live/messages';
 import { fixed } from './format';
 
 type Unit = 'm' | 's' | '%' | '×' | 'χ²' | 'σ' | '';

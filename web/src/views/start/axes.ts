@@ -1,5 +1,5 @@
 /// Which way x, y, z of a track count, known by names, or asked for where the heights could be of either. No DOM.
-import { plain, type Columns } from './fields';
+import { plain, type Columns } from './names';
 import { number_of, type Table } from './table_file';
 
 /// East, north, up; or north, east, down, as autopilots write.

@@ -2,7 +2,8 @@
 import type { Wire } from '../../api/contract';
 import { num, obj, str } from '../../live/messages';
 import { enu_attitude, enu_of, is_east, track_axes, type TrackAxes } from './axes';
-import { is_local, missing_ranges, missing_track, type Columns, type Field } from './fields';
+import { is_local, missing_ranges, missing_track } from './fields';
+import type { Columns, Field } from './names';
 import {
   heading_kind,
   hemisphere_sign,

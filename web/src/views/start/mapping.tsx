@@ -7,18 +7,8 @@ import { load_missions } from '../../state/archive';
 import { chosen_mission, say } from '../../state/store';
 import { fixed, grouped } from '../../ui/format';
 import { is_east, TRACK_AXES } from './axes';
-import {
-  FIELD_WORDS,
-  guessed_ranges,
-  guessed_track,
-  is_local,
-  missing_ranges,
-  missing_track,
-  RANGE_FIELDS,
-  TRACK_FIELDS,
-  type Columns,
-  type Field,
-} from './fields';
+import { guessed_ranges, guessed_track, is_local, missing_ranges, missing_track } from './fields';
+import { FIELD_WORDS, RANGE_FIELDS, TRACK_FIELDS, type Columns, type Field } from './names';
 import {
   flight_of,
   guessed_reading,

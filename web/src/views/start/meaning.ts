@@ -1,5 +1,5 @@
 /// Columns that change what another one means, and what a name leaves open of headings and addresses. No DOM.
-import { NAMES, plain, type Columns, type Field } from './fields';
+import { NAMES, plain, type Columns, type Field } from './names';
 import { number_of, values_of, type Table } from './table_file';
 import { address_of, type LengthUnit } from './values';
 

@@ -1,5 +1,6 @@
 /// Where a track's numbers are: degrees, a local frame, a map, the earth's centre; and above what its heights are. No DOM.
-import { is_local, plain, type Columns } from './fields';
+import { is_local } from './fields';
+import { plain, type Columns } from './names';
 import { beyond, degrees_kind, MOST_LOCAL_M, numbers_of, type DegreesKind, type Table } from './table_file';
 import { unit_of_name, type LengthUnit } from './values';
 

@@ -1,5 +1,5 @@
 /// The tags of a table of ranges, and addresses that are tag and anchor. No DOM.
-import type { Columns } from './fields';
+import type { Columns } from './names';
 import type { Table } from './table_file';
 
 export function tags_of(t: Table, c: Columns): readonly [readonly string[], readonly string[]] {

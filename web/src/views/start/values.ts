@@ -1,5 +1,5 @@
 /// How a flight's values are written: moments, lengths and fix classes, known by their looks or given by a person. No DOM.
-import { plain } from './fields';
+import { plain } from './names';
 import { number_of, sample_of, values_of, type Table } from './table_file';
 
 export type TimeUnit = 's' | 'ms' | 'us' | 'ns' | 'date';
