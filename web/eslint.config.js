@@ -65,6 +65,11 @@ export default typescript.config(
           selector: ':matches(JSXElement, JSXFragment):not(:function *)',
           message: 'an element that is kept keeps every picture it was in: make it in a function',
         },
+        {
+          selector: 'JSXAttribute[name.name="type"] > Literal[value="number"]',
+          message:
+            'a browser says "" of a number with a comma, or drops the comma: a text field, and ui/typed_number.ts',
+        },
       ],
     },
   },

@@ -157,6 +157,23 @@ struct AccessService::State {
   void note_end(Admitted& all, const std::string& key, const Token& token) const {
     if (token.expires) all.ends.try_emplace(key, later(steady_now(), token.expires->ns - clock.now().ns));
   }
+  /// A store that cannot write says so by its health; who signs in while the disk is full is let in all the
+  /// same.
+  void keep(BrowserSession& session, const std::string& pushed_out) const {
+    const UtcTime now = clock.now();
+    session.until = UtcTime{now.ns + std::chrono::nanoseconds(options.session_lifetime).count()};
+    if (!pushed_out.empty()) (void)store.end_session(pushed_out).has_value();
+    (void)store.keep_session(session, now).has_value();
+  }
+  /// A clock that stood elsewhere at its login gives a session no more than its lifetime.
+  void let_in_again(Admitted& all, const BrowserSession& kept) const {
+    const auto left = std::chrono::nanoseconds(kept.until.ns - clock.now().ns);
+    if (left.count() <= 0) return;
+    const auto most = std::min<std::chrono::nanoseconds>(left, options.session_lifetime);
+    all.sessions.try_emplace(
+        kept.cookie_sha256_hex,
+        Session{without_dashes(kept.token.uuid), later(steady_now(), most.count()), all.next_order++});
+  }
   void note_use(const std::string& key) const {
     auto noted = notes.lock();
     noted->used[key] = clock.now();
@@ -174,6 +191,7 @@ OrganizationIndex& AccessService::organizations() { return state_->organizations
 Result<void> AccessService::load() {
   BOOST_OUTCOME_TRYV(state_->organizations.load());
   BOOST_OUTCOME_TRY(auto all, state_->store.tokens());
+  BOOST_OUTCOME_TRY(auto sessions, state_->store.sessions());
   for (auto& token : all) state_->bind(token);
   auto admitted = state_->admitted.lock();
   admitted->tokens.clear();
@@ -182,6 +200,7 @@ Result<void> AccessService::load() {
     state_->note_end(*admitted, key, token);
     admitted->tokens.emplace(key, std::move(token));
   }
+  for (const auto& kept : sessions) state_->let_in_again(*admitted, kept);
   return boost::outcome_v2::success();
 }
 
@@ -271,7 +290,8 @@ std::optional<Principal> AccessService::verify(std::string_view token_text) cons
 
 Result<std::string> AccessService::open_session(std::string_view token_text, std::string_view from) {
   const std::string cookie = random_hex_256();
-  std::string who;
+  std::string who, pushed_out;
+  BrowserSession kept{sha256_hex(cookie), {}, {}};
   {
     const SteadyTime now = state_->steady_now();
     auto admitted = state_->admitted.lock();
@@ -280,13 +300,17 @@ Result<std::string> AccessService::open_session(std::string_view token_text, std
       who = to_string(token->id);
       std::erase_if(sessions, [&](const auto& entry) { return entry.second.until <= now; });
       if (sessions.size() >= state_->options.max_sessions) {
-        sessions.erase(
-            std::ranges::min_element(sessions, {}, [](const auto& entry) { return entry.second.order; }));
+        const auto oldest =
+            std::ranges::min_element(sessions, {}, [](const auto& entry) { return entry.second.order; });
+        pushed_out = oldest->first;
+        sessions.erase(oldest);
       }
-      sessions[sha256_hex(cookie)] = {without_dashes(token->id.uuid),
-                                      in(now, state_->options.session_lifetime), admitted->next_order++};
+      kept.token = token->id;
+      sessions[kept.cookie_sha256_hex] = {without_dashes(token->id.uuid),
+                                          in(now, state_->options.session_lifetime), admitted->next_order++};
     }
   }
+  if (!who.empty()) state_->keep(kept, pushed_out);
   audit(who.empty() ? "nobody" : who, "login", from, who.empty() ? "refused" : "done");
   if (who.empty()) return make_error(Errc::invalid_argument, "this token is unknown, expired or revoked");
   return cookie;
@@ -301,6 +325,7 @@ void AccessService::close_session(std::string_view cookie, std::string_view from
     who = at->second.token_id;
     admitted->sessions.erase(at);
   }
+  (void)state_->store.end_session(sha256_hex(cookie)).has_value();
   audit(who, "logout", from, "done");
 }
 

@@ -53,8 +53,9 @@ struct Login {
 ///
 /// Tokens live in the store and, all of them, in a cache here, so that verify() never touches the disk.
 /// Secrets are 256 random bits of OpenSSL's generator, kept as SHA-256 and compared in constant time (a fast
-/// hash is right for random secrets: nothing can be guessed). Sessions and tickets live in memory and end
-/// with the process. Thread-safe.
+/// hash is right for random secrets: nothing can be guessed). Sessions are in the store too, so that nobody
+/// is signed out when the server starts again in a flight; one that the store could not take, and every
+/// ticket, ends with the process. Thread-safe.
 class AccessService {
  public:
   AccessService(const Stores& stores, const Clock& clock, AccessOptions options = {});
@@ -62,7 +63,7 @@ class AccessService {
   AccessService(const AccessService&) = delete;
   AccessService& operator=(const AccessService&) = delete;
 
-  /// Reads every token and every organization. Call before the first verify().
+  /// Reads every token, session and organization. Call before the first verify().
   Result<void> load();
   OrganizationIndex& organizations();
   bool has_tokens() const;

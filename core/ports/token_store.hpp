@@ -27,6 +27,13 @@ struct Token {
   std::optional<std::uint32_t> requests_per_minute{};  ///< at most; nothing: no limit of its own
 };
 
+/// A browser that was let in by a token; only the hash of its cookie is stored.
+struct BrowserSession {
+  std::string cookie_sha256_hex;
+  TokenId token{};
+  UtcTime until{};
+};
+
 class TokenStore {
  public:
   virtual ~TokenStore() = default;
@@ -38,6 +45,11 @@ class TokenStore {
   virtual Result<void> touch(const TokenId& id,
                              UtcTime now) = 0;  ///< last used; call it at most once a minute
   virtual Result<void> revoke(const TokenId& id, UtcTime now) = 0;
+  /// Those whose time has passed `now` leave. errors: not_found where its token is not there, conflict
+  virtual Result<void> keep_session(const BrowserSession& session, UtcTime now) = 0;
+  /// Also where it is not there.
+  virtual Result<void> end_session(std::string_view cookie_sha256_hex) = 0;
+  virtual Result<std::vector<BrowserSession>> sessions() = 0;  ///< the one that ends first comes first
 };
 
 }  // namespace anchord

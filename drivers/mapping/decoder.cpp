@@ -234,8 +234,7 @@ Decoder::Clock* Decoder::clock_of(NetworkId tag) {
 
 std::int64_t Decoder::steady_of(timing::ClockModel& model, std::int64_t device_ns,
                                 const device::Arrival& at) {
-  model.add(device_ns, at.steady_ns);
-  const auto stamp = model.steady_of(device_ns);
+  const auto stamp = model.stamp(device_ns, at.steady_ns);
   out_.clock({-model.drift() * 1e6, stamp ? stamp->sigma_ns * 1e-9 : 0, model.settled(),
               model.drift_known() && model.drift_too_large()});
   return stamp ? stamp->ns : at.steady_ns;

@@ -233,8 +233,7 @@ Script<int> Unit::range_anchors() {
 void Unit::emit(const Ranging& ranging, std::uint16_t anchor, const std::optional<CirRecord>& cir,
                 std::optional<double> heading_deg) {
   const std::int64_t device_ns = (*unwrap_)(ranging.info.time_ms) * 1'000'000;
-  clock_.add(device_ns, ranging.seen_ns);
-  const auto stamp = clock_.steady_of(device_ns);
+  const auto stamp = clock_.stamp(device_ns, ranging.seen_ns);
   // A fit that began anew knows nothing yet: what was known of the clock stays.
   if (clock_.drift_known()) skewed_ = clock_.drift_too_large();
   out_.clock({-clock_.drift() * 1e6, stamp ? stamp->sigma_ns * 1e-9 : 0, clock_.settled(), skewed_});

@@ -181,6 +181,14 @@ double ClockModel::sigma_at(std::int64_t device_ns) const {
   return std::hypot(1e5, lean);
 }
 
+std::optional<Stamp> ClockModel::stamp(std::int64_t device_ns, std::int64_t arrival_ns) {
+  add(device_ns, arrival_ns);
+  const auto found = steady_of(device_ns);
+  if (!found || found->ns > arrival_ns + options_.early_ns || found->ns < arrival_ns - options_.late_span_ns)
+    return std::nullopt;
+  return found;
+}
+
 std::optional<Stamp> ClockModel::steady_of(std::int64_t device_ns) const {
   if (buckets_.empty()) return std::nullopt;
   return Stamp{device_ns + static_cast<std::int64_t>(std::llround(lag_at(device_ns))), sigma_at(device_ns)};

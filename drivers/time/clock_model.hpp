@@ -38,6 +38,10 @@ class ClockModel {
   explicit ClockModel(const ClockModelOptions& options = {}) : options_(options) {}
 
   void add(std::int64_t device_ns, std::int64_t arrival_ns);
+  /// add(), and when this instant would have arrived with the least delay. Absent where the two do not belong
+  /// together, more than `early_ns` after the arrival or `late_span_ns` before it: a digit is wrong, or the
+  /// clock has just jumped. The arrival is the better stamp then.
+  std::optional<Stamp> stamp(std::int64_t device_ns, std::int64_t arrival_ns);
 
   /// Steady time at which this instant of the device would have arrived with the least delay; absent before
   /// the first sample.

@@ -18,6 +18,13 @@ constexpr const char* k_sites = "SELECT site_id FROM token_site WHERE token_id =
 constexpr const char* k_revoke =
     "UPDATE token SET revoked_t_ns = coalesce(revoked_t_ns, ?2) WHERE id = ?1 RETURNING revoked_t_ns";
 constexpr const char* k_touch = "UPDATE token SET last_used_t_ns = ?2 WHERE id = ?1 RETURNING last_used_t_ns";
+constexpr const char* k_drop_sessions = "DELETE FROM browser_session WHERE until_t_ns <= ?1";
+constexpr const char* k_insert_session =
+    "INSERT INTO browser_session (cookie_sha256_hex, token_id, until_t_ns) VALUES (?1, ?2, ?3)";
+constexpr const char* k_end_session = "DELETE FROM browser_session WHERE cookie_sha256_hex = ?1";
+constexpr const char* k_sessions =
+    "SELECT cookie_sha256_hex, token_id, until_t_ns FROM browser_session ORDER BY until_t_ns, "
+    "cookie_sha256_hex";
 
 Token read(Connection& c, Query& query) {
   Token token;
@@ -84,6 +91,41 @@ class SqlTokenStore final : public TokenStore {
   }
   Result<void> revoke(const TokenId& id, UtcTime now) override { return stamp(k_revoke, id, now); }
   Result<void> touch(const TokenId& id, UtcTime now) override { return stamp(k_touch, id, now); }
+  Result<void> keep_session(const BrowserSession& session, UtcTime now) override {
+    return write_void(gate_, [&](Connection& c) -> std::optional<Error> {
+      Query drop(c, k_drop_sessions);
+      drop << now;
+      drop.run();
+      Query known(c, "SELECT bound FROM token WHERE id = ?1");
+      known << session.token;
+      if (!known.step()) return make_error(Errc::not_found, "no token " + to_string(session.token));
+      Query query(c, k_insert_session);
+      query << session.cookie_sha256_hex << session.token << session.until;
+      query.run();
+      return std::nullopt;
+    });
+  }
+  Result<void> end_session(std::string_view cookie_sha256_hex) override {
+    return write_void(gate_, [&](Connection& c) -> std::optional<Error> {
+      Query query(c, k_end_session);
+      query << cookie_sha256_hex;
+      query.run();
+      return std::nullopt;
+    });
+  }
+  Result<std::vector<BrowserSession>> sessions() override {
+    using Sessions = std::vector<BrowserSession>;
+    return read_value<Sessions>(gate_, [&](Connection& c) -> Result<Sessions> {
+      Query query(c, k_sessions);
+      Sessions found;
+      while (query.step()) {
+        auto cookie = query.text();
+        const auto token = query.id<TokenId>();
+        found.push_back({std::move(cookie), token, query.time()});
+      }
+      return found;
+    });
+  }
 
  private:
   template <class Key>

@@ -277,6 +277,12 @@ test('who may only look sees no tool that he may not use', async () => {
       const fields = page.locator('main :is(input, textarea):enabled:not([readonly])').filter({ visible: true });
       assert.equal(await fields.count(), 0, `a plan to look at, ${size}`);
     }
+    // A server that ends and starts again knows who is signed in.
+    await closed.kill();
+    await eventually('LOST', async () => (await text(id('status-link'))).includes('LOST'), 10_000);
+    await closed.start();
+    await eventually('LIVE after the restart', async () => (await text(id('status-link'))).includes('LIVE'), 20_000);
+    assert.equal(await id('sign-in').count(), 0);
     await page.close();
     await browser.context.clearCookies();
   } finally {

@@ -203,7 +203,11 @@ test("the filter is the server's: the list, the count and the file are of the sa
   await id('source').selectOption(mission);
   const count = async () => (await text(id('counts'))).split(' of ').map((n) => Number(n.replace(/\D/g, '')));
   await eventually('all are counted', async () => (await count())[0] === items.length);
-  await id('distance-to').fill(String(limit));
+  await id('distance-to').fill('9 m');
+  await id('distance-to').press('Enter');
+  assert.equal(await id('distance-to').getAttribute('aria-invalid'), 'true', 'no number, no filter');
+  assert.equal((await count())[0], items.length);
+  await id('distance-to').fill(limit.toFixed(1).replace('.', ','));
   await id('distance-to').press('Enter');
   await eventually('fewer are counted', async () => (await count()).join() === [near.length, items.length].join());
   const file = await fetch(await id('download-ndjson').getAttribute('href'));

@@ -21,6 +21,11 @@ const client = new LiveClient(TOPICS, browser_environment(), PARAMS);
 pace_components();
 render(<App />, document.getElementById('app')!);
 addEventListener('keydown', on_key);
+// A file that is dropped beside its place would be opened instead of this page, in flight too.
+for (const kind of ['dragover', 'drop'] as const)
+  addEventListener(kind, (e) => {
+    if (e.dataTransfer?.types.includes('Files')) e.preventDefault();
+  });
 /// Signed out, the stream rests until somebody signs in; the last picture stays.
 let started = false;
 void refresh_me().then(() =>

@@ -68,12 +68,12 @@ TEST(Outline, LosesNoFenceAndKnowsItsKindHoweverItIsWritten) {
   std::vector<FieldError> errors;
   ASSERT_TRUE(read_outline(with("No fly", one), errors));
   EXPECT_THAT(outline_pointers(with("perimeter", one)),
-              testing::Contains("/features/1/properties/kind unknown_value"));
+              ::testing::Contains("/features/1/properties/kind unknown_value"));
   const auto two = R"({"type":"MultiPolygon","coordinates":[[)" + ring + "],[" + ring + "]]}";
-  EXPECT_THAT(outline_pointers(with("fence", two)), testing::ElementsAre("/features/1/geometry conflict"));
+  EXPECT_THAT(outline_pointers(with("fence", two)), ::testing::ElementsAre("/features/1/geometry conflict"));
   const auto hole = R"({"type":"Polygon","coordinates":[)" + ring + "," + ring + "]}";
   EXPECT_THAT(outline_pointers(with("fence", hole)),
-              testing::ElementsAre("/features/1/geometry/coordinates conflict"));
+              ::testing::ElementsAre("/features/1/geometry/coordinates conflict"));
 }
 
 TEST(Outline, ReadsSeveralPartsAsTheirHull) {

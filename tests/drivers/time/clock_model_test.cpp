@@ -124,6 +124,27 @@ TEST(ClockModel, IgnoresOneDamagedTime) {
   EXPECT_NEAR(static_cast<double>(model.steady_of(30 * k_s)->ns), static_cast<double>(35 * k_s), 1e6);
 }
 
+/// Nothing guards the numbers on a tag's wire: one bit of a counter of milliseconds, from 1 ms to 24 days.
+TEST(ClockModel, StampsNothingByATimeWithABitThatIsWrong) {
+  const Truth truth;
+  for (int bit = 0; bit < 31; ++bit) {
+    ClockModel model;
+    for (std::int64_t t = truth.start_ns; t < truth.start_ns + 30 * k_s; t += 100 * k_ms) {
+      const bool damaged = t > truth.start_ns + 12 * k_s && (t / (100 * k_ms)) % 12 == 0;
+      const auto device_ns = truth.device(t) / k_ms * k_ms;
+      const auto said_ns = damaged ? (device_ns / k_ms ^ (std::int64_t{1} << bit)) * k_ms : device_ns;
+      const auto stamp = model.stamp(said_ns, t);
+      if (!damaged) {
+        ASSERT_TRUE(stamp) << bit;
+        EXPECT_NEAR(static_cast<double>(stamp->ns - t), 0, 2e6) << bit;
+      } else if (stamp) {  // as a link that stalls
+        EXPECT_LT(stamp->ns, t + 51 * k_ms) << bit;
+        EXPECT_GT(stamp->ns, t - 5 * k_s) << bit;
+      }
+    }
+  }
+}
+
 TEST(ClockModel, ReportsAClockThatIsNone) {
   Truth bad;
   bad.drift = 5e-4;

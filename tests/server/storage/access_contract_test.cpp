@@ -39,6 +39,42 @@ TEST_P(AccessContract, FindsATokenBySecretAndKeepsTheFirstRevocation) {
   EXPECT_EQ(db_->stores().tokens.tokens().value().size(), 1u);
 }
 
+TEST_P(AccessContract, KeepsBrowserSessionsUntilTheyEnd) {
+  auto& tokens = db_->stores().tokens;
+  const Token token{TokenId{make_uuid_v7(k_noon)},
+                    "tablet",
+                    std::string(64, 'a'),
+                    {"operator"},
+                    k_noon,
+                    {},
+                    {},
+                    {},
+                    {},
+                    {},
+                    {}};
+  ASSERT_TRUE(tokens.insert(token));
+  const BrowserSession late{std::string(64, 'b'), token.id, UtcTime{900}},
+      early{std::string(64, 'c'), token.id, UtcTime{500}},
+      after{std::string(64, 'd'), token.id, UtcTime{990}};
+  const auto cookies = [&] {
+    std::vector<std::string> all;
+    for (const auto& one : tokens.sessions().value()) all.push_back(one.cookie_sha256_hex.substr(0, 1));
+    return all;
+  };
+  for (const auto& one : {late, early}) ASSERT_TRUE(tokens.keep_session(one, UtcTime{100}));
+  EXPECT_THAT(cookies(), ElementsAre("c", "b"));
+  EXPECT_EQ(tokens.sessions().value()[1].token, token.id);
+  EXPECT_EQ(tokens.sessions().value()[1].until, UtcTime{900});
+  EXPECT_EQ(tokens.keep_session(late, UtcTime{100}).error().code, Errc::conflict);
+  EXPECT_EQ(tokens.keep_session({std::string(64, 'e'), {}, UtcTime{900}}, UtcTime{100}).error().code,
+            Errc::not_found);
+  ASSERT_TRUE(tokens.keep_session(after, UtcTime{500}));
+  EXPECT_THAT(cookies(), ElementsAre("b", "d"));
+  ASSERT_TRUE(tokens.end_session(late.cookie_sha256_hex));
+  ASSERT_TRUE(tokens.end_session(late.cookie_sha256_hex));
+  EXPECT_THAT(cookies(), ElementsAre("d"));
+}
+
 TEST_P(AccessContract, KeepsTheSitesThatATokenIsBoundTo) {
   const SiteId north{make_uuid_v7(k_noon)}, south{make_uuid_v7(k_noon)};
   Token bound{TokenId{make_uuid_v7(k_noon)},

@@ -68,7 +68,8 @@ TEST_F(Migrate, FindsEveryLandedMigrationAsItWas) {
             "20 1352e742a624fea1d90bef0c901052fca5fb74416b1de59078c4ec154e47d45b\n"
             "21 84c4b4519ba854471f06258236d51fe2308c585274418d8b00ee6d5fcd97d85f\n"
             "22 3f353be0ec3276795a2b41bdf12553b667b26e63b4b7c4972e07032bb0211cb2\n"
-            "23 6454ed717093a8f18de1950f6279cdb7371cbd5231d42d4b3ec364d97592f255\n");
+            "23 6454ed717093a8f18de1950f6279cdb7371cbd5231d42d4b3ec364d97592f255\n"
+            "24 dd1416ca2fbf3db40b8c7f6366e2cedcf1a790ca18755680e1ed7695887820b4\n");
 }
 
 TEST_F(Migrate, KnowsTheDigestOfAPublishedVector) {

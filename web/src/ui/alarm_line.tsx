@@ -1,19 +1,28 @@
 /// One line for alarms under the strip. Its place is always kept, so that nothing on the page moves under a finger when an alarm comes, when
 /// they become several, or when the last one goes: what does not fit lies over the page, in a list that is opened.
 import { useRef, useState } from 'preact/hooks';
+import { me } from '../state/session';
 import { link, live_source, now_ms, tick } from '../state/store';
 import { by_urgency, type Alarm } from './alarm_rules';
 import { acknowledge, alarms, mute } from './alarms';
 import { AlarmRow, shape_of } from './alarm_row';
 import { age, clock } from './format';
 import { Mark } from './marks';
+import { open_sign_in } from './sign_in_state';
 import { useDialog } from './use_dialog';
 
 const UNREAD_MS = 500; ///< a tap that soon after the line has changed was meant for what stood there before
 
 const for_s = (a: Alarm): string => clock((now_ms() - a.since_ms) / 1000, true);
 
+/// Signed out there is nothing to retry: the server is asked again once somebody has signed in.
 function Retry() {
+  if (me.value === null)
+    return (
+      <button class="btn" onClick={open_sign_in}>
+        Sign in
+      </button>
+    );
   const retry = live_source()?.retry_in_ms() ?? null;
   return (
     <button class="btn" onClick={() => live_source()?.retryNow()}>

@@ -16,7 +16,10 @@ import { AlarmLimiter, Conditions, merged, newest_refusal, type Alarm } from './
 const conditions = new Conditions();
 const limiter = new AlarmLimiter();
 const acknowledged = signal<ReadonlySet<string>>(new Set());
-export const sound = signal<'off' | 'on' | 'muted'>('off');
+const wanted = signal<'off' | 'on' | 'muted'>('off'),
+  audible = signal(true);
+/// Blocked: it was turned on, and the browser plays nothing: not allowed, no output, or taken away (a call, a locked screen).
+export const sound = computed(() => (wanted.value === 'on' && !audible.value ? 'blocked' : wanted.value));
 
 export const alarms = computed<readonly Alarm[]>(() => {
   tick.value;
@@ -55,12 +58,25 @@ export const acknowledge = (id: string): void => {
 };
 
 let audio: AudioContext | null = null;
+const AUDIBLE_AFTER_MS = 1000; ///< a browser that may play does so well before
+const heard = (): void => void (audible.value = audio?.state === 'running');
+/// A promise that never settles, or is refused, is the browser's way to say that it may not.
+function resume(): void {
+  if (audio?.state !== 'running') audio?.resume().catch(() => undefined);
+}
+function make_audio(): AudioContext | null {
+  if (!('AudioContext' in window)) return null;
+  const made = new AudioContext();
+  made.addEventListener('statechange', heard);
+  return made;
+}
 /// Browsers need a tap before they sound: the button in the strip is that tap.
 export function toggle_sound(): void {
-  audio ??= 'AudioContext' in window ? new AudioContext() : null;
-  void audio?.resume();
-  sound.value = sound.value === 'on' ? 'muted' : 'on';
-  if (sound.value === 'muted') mute();
+  audio ??= make_audio();
+  resume();
+  setTimeout(heard, AUDIBLE_AFTER_MS);
+  wanted.value = sound.value === 'on' ? 'muted' : 'on';
+  if (wanted.value === 'muted') mute();
   else {
     limiter.unmute();
     tones('warning');
@@ -69,15 +85,16 @@ export function toggle_sound(): void {
 let unmute_timer: ReturnType<typeof setTimeout> | undefined;
 export function mute(): void {
   limiter.mute(now_ms() + 120_000);
-  if (sound.value === 'on') sound.value = 'muted';
+  if (wanted.value === 'on') wanted.value = 'muted';
   clearTimeout(unmute_timer); // of an earlier time: its two minutes are not this one's
   unmute_timer = setTimeout(() => {
-    if (sound.value === 'muted') sound.value = 'on';
+    if (wanted.value === 'muted') wanted.value = 'on';
   }, 120_000);
 }
 /// Critical: three fast high tones; warning: two low ones.
 function tones(priority: Alarm['priority']): void {
   if (!audio) return;
+  resume();
   const [n, hz, gap_s] = priority === 'critical' ? [3, 1320, 0.16] : [2, 520, 0.28];
   for (let i = 0; i < n; i++) {
     const [o, g] = [audio.createOscillator(), audio.createGain()],
@@ -92,5 +109,5 @@ function tones(priority: Alarm['priority']): void {
 }
 effect(() => {
   const due = limiter.due(alarms.value, now_ms());
-  if (due && sound.peek() !== 'off') tones(due.priority);
+  if (due && wanted.peek() !== 'off') tones(due.priority);
 });

@@ -364,9 +364,12 @@ export function Strip() {
         class="ib opt"
         data-testid="sound"
         aria-label={
-          { off: 'Sound off. Tap to enable', on: 'Sound on. Mute 2 minutes', muted: 'Muted. Tap to unmute' }[
-            sound.value
-          ]
+          {
+            off: 'Sound off. Tap to enable',
+            on: 'Sound on. Mute 2 minutes',
+            muted: 'Muted. Tap to unmute',
+            blocked: 'The browser plays no sound. Tap to try again',
+          }[sound.value]
         }
         onClick={toggle_sound}
       >

@@ -1,5 +1,5 @@
 /// How well one anchor is known over the flight, log scale, with the server's limit drawn in. uPlot comes with this chunk.
-import { useEffect, useRef } from 'preact/hooks';
+import { useEffect, useRef, useState } from 'preact/hooks';
 import type uPlot from 'uplot';
 import { goal_of } from '../state/done';
 import { current_mission, current_scene, replayed, tick, watched_scene } from '../state/store';
@@ -32,7 +32,8 @@ const NOTHING: HistoryPoint = { t_us: 0, sigma_h_m: null, sigma_m: null, h95_m: 
 
 export function Convergence({ anchor }: { anchor: string }) {
   const box = useRef<HTMLDivElement>(null),
-    plot = useRef<uPlot | null>(null);
+    plot = useRef<uPlot | null>(null),
+    [failed, set_failed] = useState('');
   tick.value;
   const scene = watched_scene(),
     history = scene?.history.get(anchor) ?? [],
@@ -51,24 +52,27 @@ export function Convergence({ anchor }: { anchor: string }) {
   });
   useEffect(() => {
     let gone = false;
-    void import('./plot').then(({ make_convergence }) => {
-      if (gone || !box.current) return;
-      plot.current = make_convergence(
-        box.current,
-        {
-          ink: css('--ink'),
-          ground: css('--panel'),
-          text: css('--ink-3'),
-          line: css('--line'),
-          ok: css('--ok'),
-          font: css('--font'),
-          width: Number(css('--lw-data')) || 2,
-          rem: parseFloat(getComputedStyle(document.documentElement).fontSize),
-        },
-        limit_m,
-      );
-      draw();
-    });
+    void import('./plot').then(
+      ({ make_convergence }) => {
+        if (gone || !box.current) return;
+        plot.current = make_convergence(
+          box.current,
+          {
+            ink: css('--ink'),
+            ground: css('--panel'),
+            text: css('--ink-3'),
+            line: css('--line'),
+            ok: css('--ok'),
+            font: css('--font'),
+            width: Number(css('--lw-data')) || 2,
+            rem: parseFloat(getComputedStyle(document.documentElement).fontSize),
+          },
+          limit_m,
+        );
+        draw();
+      },
+      (e: unknown) => set_failed(e instanceof Error ? e.message : String(e)),
+    );
     const resize = new ResizeObserver(() => {
       if (box.current && plot.current)
         plot.current.setSize({ width: box.current.clientWidth, height: box.current.clientHeight });
@@ -93,7 +97,11 @@ export function Convergence({ anchor }: { anchor: string }) {
         <b>{last === null ? 'not known yet' : last < 1 ? `${fixed(last * 100, 1)} cm` : `${fixed(last, 1)} m`}</b>
         {limit_m !== null && <span class="mut q"> limit ≤ {fixed(limit_m * 100, 1)} cm</span>}
       </figcaption>
-      <div ref={box} class="plot" role="img" aria-label={words} />
+      {failed ? (
+        <p class="why">The chart could not be drawn: {failed}</p>
+      ) : (
+        <div ref={box} class="plot" role="img" aria-label={words} />
+      )}
     </figure>
   );
 }

@@ -2,6 +2,7 @@
 /// would not show a wrong arm waits for that word where its mission says nothing.
 import { useState } from 'preact/hooks';
 import { fixed } from '../ui/format';
+import { typed_number } from '../ui/typed_number';
 
 const TAPE_MEASURE_M = 0.02;
 
@@ -14,7 +15,7 @@ interface Props {
 
 export function LeverArmSigma({ withheld, held_m, busy, solve }: Props) {
   const [typed, set_typed] = useState(String(held_m ?? TAPE_MEASURE_M));
-  const sigma_m = Number(typed.replace(',', '.')),
+  const sigma_m = typed_number(typed) ?? NaN,
     good = Number.isFinite(sigma_m) && sigma_m > 0; // how much is too much the server says
   return (
     <form

@@ -109,15 +109,23 @@ export function Checklist({
           {items.map((i) => (
             <Item key={i.id} item={i} set={set} />
           ))}
-          {sound.value === 'off' && (
+          {(sound.value === 'off' || sound.value === 'blocked') && (
             <li data-testid="check-sound">
               <Mark shape="off" tone="off" />
               <span class="grow">
-                <b>The sound of alarms is off</b>
-                <span class="mut block">A browser sounds only after a tap; nothing else waits for it.</span>
+                <b>
+                  {sound.value === 'off'
+                    ? 'The sound of alarms is off'
+                    : 'The browser plays no sound: alarms are silent'}
+                </b>
+                <span class="mut block">
+                  {sound.value === 'off'
+                    ? 'A browser sounds only after a tap; nothing else waits for it.'
+                    : 'See that the device has an output, is not silenced, and that the browser may play sound here.'}
+                </span>
               </span>
               <button class="btn" onClick={toggle_sound}>
-                Turn sound on
+                {sound.value === 'off' ? 'Turn sound on' : 'Try again'}
               </button>
             </li>
           )}

@@ -1,6 +1,7 @@
 /// The filters in one band: each is a field of the server's own query, so that what is listed, drawn and downloaded is the same.
 import { useState } from 'preact/hooks';
 import { EVERYTHING, type Filter, type Source } from '../../api/measurements';
+import { typed_number } from '../../ui/typed_number';
 import { LABELS, time_text, typed_time } from './choice';
 
 /// An anchor of a flight, or a place of a campaign: its environments, or its settings where it names none.
@@ -17,15 +18,15 @@ interface Props {
 export function Filters({ source, filter: f, who, set }: Props) {
   const flight = source.kind === 'mission',
     put = (part: Partial<Filter>): void => set({ ...f, ...part });
-  const band = (name: string, unit: string, step: string, low: 'min_m' | 'min_dbm', high: 'max_m' | 'max_dbm') => (
+  const band = (name: string, unit: string, low: 'min_m' | 'min_dbm', high: 'max_m' | 'max_dbm') => (
     <div class="limits" role="group" aria-label={`${name}, ${unit}`}>
       <span class="lab">
         {name}, {unit}
       </span>
       <span class="ends">
-        <End name={`${name} from`} value={f[low]} step={step} set={(v) => put({ [low]: v })} />
+        <End name={`${name} from`} value={f[low]} set={(v) => put({ [low]: v })} />
         <span aria-hidden="true">–</span>
-        <End name={`${name} to`} value={f[high]} step={step} set={(v) => put({ [high]: v })} />
+        <End name={`${name} to`} value={f[high]} set={(v) => put({ [high]: v })} />
       </span>
     </div>
   );
@@ -93,8 +94,8 @@ export function Filters({ source, filter: f, who, set }: Props) {
           <option value="unclear">unclear</option>
         </select>
       </label>
-      {band('Distance', 'm', '0.5', 'min_m', 'max_m')}
-      {band('RSS', 'dBm', '1', 'min_dbm', 'max_dbm')}
+      {band('Distance', 'm', 'min_m', 'max_m')}
+      {band('RSS', 'dBm', 'min_dbm', 'max_dbm')}
       {flight && (
         <label>
           <span class="lab">Fix</span>
@@ -124,28 +125,20 @@ export function Filters({ source, filter: f, who, set }: Props) {
 }
 
 /// What is being typed is the field's own until it is done: the page is drawn anew whenever something arrives.
-function End({
-  name,
-  value,
-  step,
-  set,
-}: {
-  name: string;
-  value: number | null;
-  step: string;
-  set: (v: number | null) => void;
-}) {
+function End({ name, value, set }: { name: string; value: number | null; set: (v: number | null) => void }) {
   const [typed, type] = useState<string | null>(null);
+  const wrong = typed !== null && Number.isNaN(typed_number(typed)) && !/^[+−–-]?$/.test(typed.trim());
   const done = (v: string): void => {
+    const number = typed_number(v);
+    if (Number.isNaN(number)) return; // it stays, marked; the filter is what it was
     type(null);
-    set(v === '' || !Number.isFinite(Number(v)) ? null : Number(v));
+    set(number);
   };
   return (
     <input
-      type="number"
-      step={step}
       inputMode="decimal"
       value={typed ?? value ?? ''}
+      aria-invalid={wrong}
       aria-label={name}
       data-testid={name.toLowerCase().replace(' ', '-')}
       onInput={(e) => type(e.currentTarget.value)}

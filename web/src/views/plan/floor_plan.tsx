@@ -25,6 +25,7 @@ import { Empty, useLoad } from '../../ui/empty';
 import { fixed } from '../../ui/format';
 import { Icon } from '../../ui/marks';
 import { Problem } from '../../ui/problem';
+import { typed_number } from '../../ui/typed_number';
 import { useDialog } from '../../ui/use_dialog';
 import { useDraft } from '../../ui/use_draft';
 
@@ -219,9 +220,8 @@ function Sent({ held, busy, send }: { held: Held; busy: string; send: (file: Fil
 
 /// Null where nothing is given, undefined where it is no length.
 function length_of(text: string): number | null | undefined {
-  if (!text.trim()) return null;
-  const m = Number(text.trim().replace(',', '.'));
-  return m >= 0.1 && m <= 10_000 ? m : undefined;
+  const m = typed_number(text);
+  return m === null ? null : m >= 0.1 && m <= 10_000 ? m : undefined;
 }
 
 /// Clicks on the picture, a place for each, and how well they agree.

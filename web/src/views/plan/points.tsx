@@ -2,6 +2,7 @@
 import { useState } from 'preact/hooks';
 import { SETTINGS, type NumberSetting, type Plan, type Waypoint } from '../../api/plans';
 import { fixed } from '../../ui/format';
+import { typed_number } from '../../ui/typed_number';
 import { corners, moved, removed, type Picked, type Shape } from './draft';
 
 interface Props {
@@ -33,8 +34,8 @@ export function Cell({
   const text = value === null ? '' : value.toFixed(decimals),
     [typed, type] = useState<string | null>(null);
   const take = (t: string): void => {
-    const v = Number(t.replace(',', '.'));
-    if (t.trim() === '') {
+    const v = typed_number(t);
+    if (v === null) {
       if (empty !== undefined) set(null);
     } else if (Number.isFinite(v) && v >= (min ?? -Infinity) && v <= (max ?? Infinity)) set(v);
   };

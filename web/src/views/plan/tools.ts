@@ -1,6 +1,7 @@
 /// Waypoints set by a tool: evenly along the outline, or more of them about one. Metres about the plan's origin. No DOM.
 import { setting, type Plan, type Waypoint } from '../../api/plans';
 import type { Geodetic } from '../../map/enu';
+import { typed_number } from '../../ui/typed_number';
 import { from_m, NEW_WAYPOINT, to_m } from './draft';
 
 export type Point = readonly [number, number];
@@ -138,7 +139,7 @@ export function typed_heights(text: string): number[] | null {
   const parts = text
     .trim()
     .split(/;\s*|,\s+|\s+/)
-    .map((t) => Number(t.replace(',', '.')));
+    .map((t) => typed_number(t) ?? NaN);
   return text.trim() && parts.length <= 10 && parts.every((h) => Number.isFinite(h) && h > 0 && h <= 500)
     ? parts
     : null;

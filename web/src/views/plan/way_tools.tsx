@@ -3,6 +3,7 @@ import { useState } from 'preact/hooks';
 import type { Plan } from '../../api/plans';
 import type { Geodetic } from '../../map/enu';
 import { say } from '../../state/store';
+import { typed_number } from '../../ui/typed_number';
 import type { Picked } from './draft';
 import { denser, typed_heights, usual_heights, with_even_spacing } from './tools';
 
@@ -21,7 +22,7 @@ export function WayTools({
     [heights_text, set_heights] = useState(''),
     usual = usual_heights(plan),
     heights = heights_text.trim() ? typed_heights(heights_text) : usual,
-    spacing_m = Number(text.replace(',', '.')),
+    spacing_m = typed_number(text) ?? NaN,
     good = Number.isFinite(spacing_m) && spacing_m >= 0.5 && spacing_m <= 100,
     here = picked?.shape === 'waypoints' ? picked.index : null;
   const space = (): void => {

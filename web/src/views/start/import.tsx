@@ -77,6 +77,7 @@ export function Import() {
     document.title = 'Import a flight - anchord';
     folder.current?.setAttribute('webkitdirectory', '');
   }, []);
+  const refused = (e: unknown): void => set_problem(e instanceof Error ? e.message : String(e));
   const take = (list: readonly File[]): void => {
     if (!list.length) return;
     set_problem('');
@@ -85,7 +86,7 @@ export function Import() {
       set_bundle(whole);
       return;
     }
-    found_in(list).then(set_found, (e: unknown) => set_problem(e instanceof Error ? e.message : String(e)));
+    found_in(list).then(set_found, refused);
   };
   const picked = (e: Event): void => {
     const input = e.currentTarget as HTMLInputElement;
@@ -113,7 +114,7 @@ export function Import() {
             onDrop={(e) => {
               e.preventDefault();
               set_over(false);
-              if (e.dataTransfer) void dropped(e.dataTransfer.items).then(take, () => undefined);
+              if (e.dataTransfer) void dropped(e.dataTransfer.items).then(take, (x: unknown) => refused(x));
             }}
           >
             <p>Drop it here, or</p>

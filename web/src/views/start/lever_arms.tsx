@@ -1,8 +1,16 @@
 /// From the point of the track to the tag, or to each of several.
+import { useState } from 'preact/hooks';
+import { typed_number } from '../../ui/typed_number';
 import type { About } from './flight_files';
 
 type Arm = readonly [number, number, number];
 const MOST_TAGS = 8;
+
+/// Those that count: of the one tag, or of each. A number that is none is NaN.
+export const arms_of = (tags: readonly string[], about: About): readonly Arm[] =>
+  tags.length < 2
+    ? [about.lever_arm_m]
+    : tags.slice(0, MOST_TAGS).map((tag) => about.lever_arms_m?.[tag] ?? about.lever_arm_m);
 
 export function LeverArms({
   tags,
@@ -51,6 +59,7 @@ function ArmFields({
   arm: Arm;
   set: (arm: [number, number, number]) => void;
 }) {
+  const [typed, type] = useState<Readonly<Record<number, string>>>({});
   return (
     <fieldset class="arm">
       <legend class="lab">{legend}</legend>
@@ -60,10 +69,13 @@ function ArmFields({
           class="cell"
           inputMode="decimal"
           aria-label={`${['Forward, m', 'Left, m', 'Up, m'][i]}${of}`}
-          value={arm[i]}
-          onChange={(e) => {
-            const changed = [...arm] as [number, number, number];
-            changed[i] = Number(e.currentTarget.value.replace(',', '.')) || 0;
+          value={typed[i] ?? arm[i]}
+          aria-invalid={Number.isNaN(arm[i])}
+          onInput={(e) => {
+            const text = e.currentTarget.value,
+              changed = [...arm] as [number, number, number];
+            changed[i] = typed_number(text) ?? 0;
+            type({ ...typed, [i]: text });
             set(changed);
           }}
         />

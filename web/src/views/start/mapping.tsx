@@ -24,7 +24,8 @@ import {
   type Reading,
 } from './flight_files';
 import { ADDRESS_KINDS, HEADING_KINDS, unused_columns } from './meaning';
-import { LeverArms } from './lever_arms';
+import { arms_of, LeverArms } from './lever_arms';
+import { typed_number } from '../../ui/typed_number';
 import { HEIGHT_WORDS, place_kind } from './places';
 import { anchor_columns, sample_of, with_a_row_for_each_range, type Table } from './table_file';
 import { tags_of } from './tags';
@@ -102,7 +103,8 @@ export function Mapping({ found, back }: { found: Found; back: () => void }) {
     [tags, both] = useMemo(() => tags_of(ranges, rc), [ranges, rc]),
     wide =
       !rc.anchor && !rc.range ? anchor_columns(ranges, Object.values({ ...rc, ...(track === ranges ? tc : {}) })) : [];
-  const sigma_m = arm_sigma.trim() === '' ? null : Number(arm_sigma.replace(',', '.')),
+  const sigma_m = typed_number(arm_sigma),
+    bad_arm = arms_of(tags, about).some((arm) => arm.some(Number.isNaN)),
     bad_sigma = sigma_m !== null && !(sigma_m > 0); // how much is too much the server says
   const send = async (): Promise<void> => {
     set_problem('');
@@ -380,7 +382,7 @@ export function Mapping({ found, back }: { found: Found; back: () => void }) {
         <button
           class="btn primary"
           data-testid="import-send"
-          disabled={missing.length > 0 || bad_sigma || share !== null}
+          disabled={missing.length > 0 || bad_arm || bad_sigma || share !== null}
         >
           {share === null ? 'Import' : `Importing, ${fixed(share * 100, 0)} %`}
         </button>

@@ -11,6 +11,7 @@ import { Empty, NotLoaded } from '../../ui/empty';
 import { CopyBox } from '../../ui/copy_box';
 import { Chip, Q } from '../../ui/marks';
 import { Problem } from '../../ui/problem';
+import { typed_number } from '../../ui/typed_number';
 
 const SOURCES: readonly (readonly [BaseSource, string])[] = [
   ['', 'not known'],
@@ -230,16 +231,15 @@ function DatumForm({ site, done, close }: { site: Site | null; done: () => void;
     [source, set_source] = useState<BaseSource>(site?.source ?? ''),
     [sigma, set_sigma] = useState(site?.sigma_m == null ? '' : String(site.sigma_m * 1000)),
     [problem, set_problem] = useState('');
-  const number = (s: string): number | null => (s.trim() === '' ? null : Number(s.replace(',', '.')));
   const send = async (): Promise<void> => {
     const wrong = [
       ['Epoch', epoch, '2026.34'],
       ['σ of its position', sigma, '8'],
-    ].find(([, typed]) => Number.isNaN(number(typed!)));
+    ].find(([, typed]) => Number.isNaN(typed_number(typed!)));
     if (wrong)
       return set_problem(`${wrong[0]}: “${wrong[1]}” is not a number. Write it without a unit, like ${wrong[2]}.`);
-    const mm = number(sigma),
-      d = { frame: frame.trim(), epoch: number(epoch), source, sigma_m: mm === null ? null : mm / 1000 };
+    const mm = typed_number(sigma),
+      d = { frame: frame.trim(), epoch: typed_number(epoch), source, sigma_m: mm === null ? null : mm / 1000 };
     try {
       await (site ? change_site(site.id, d) : create_site(name.trim(), d));
       say('Saved: included in every position from now on');

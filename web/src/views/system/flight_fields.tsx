@@ -3,6 +3,7 @@ import { useState } from 'preact/hooks';
 import type { Wire } from '../../api/contract';
 import { sites as fetch_sites, type Site } from '../../api/site';
 import { useLoad } from '../../ui/empty';
+import { typed_number } from '../../ui/typed_number';
 import { point_words } from './levers';
 
 const AXES = ['Forward', 'Left', 'Up'] as const;
@@ -23,7 +24,7 @@ export interface Declared {
 type Tags = readonly Wire<'TagAntenna'>[];
 export const arms_of = (tags: Tags): Arm[] =>
   tags.map((t) => ({ tag: t.tag, antenna: t.antenna ?? 0, arm_m: t.lever_arm_body_m.map(String) }));
-const number_of = (typed: string): number => (typed.trim() === '' ? NaN : Number(typed.trim().replace(',', '.')));
+const number_of = (typed: string): number => typed_number(typed) ?? NaN;
 
 /// In metres; null where a number is none.
 export function numbers_of(

@@ -6,6 +6,7 @@ import { mission_list } from '../../state/store';
 import { Mark } from '../../ui/marks';
 import { Problem } from '../../ui/problem';
 import { radio_differences } from './radio_words';
+import { typed_number } from '../../ui/typed_number';
 import { useStable } from '../../ui/use_stable';
 
 const CHOICES: readonly (readonly [Exclude<keyof Radio, 'gain_db' | 'devices'>, string, string, readonly number[]])[] =
@@ -28,6 +29,7 @@ export function RadioPanel({
   close: () => void;
 }) {
   const [radio, set] = useState<Radio | null>(null),
+    [gain, set_gain] = useState<string | null>(null), // as it is typed
     [now, set_now] = useState<Radio | null>(null),
     [problem, set_problem] = useState(''),
     [busy, set_busy] = useState(''),
@@ -35,6 +37,7 @@ export function RadioPanel({
   const flying = mission_list.value.some((m) => m.state === 'recording');
   const take = (r: Radio): void => {
     set(r);
+    set_gain(null);
     set_now(r);
     reported(r);
   };
@@ -64,7 +67,8 @@ export function RadioPanel({
     if (answer) set_done(answer);
     else await read_radio(device.id!).then(take, () => undefined); // what it has now, not what was wanted
   };
-  const changed =
+  const bad_gain = Number.isNaN(radio?.gain_db ?? 0),
+    changed =
       radio !== null &&
       now !== null &&
       (radio.gain_db !== now.gain_db || CHOICES.some(([key]) => radio[key] !== now[key])),
@@ -77,7 +81,7 @@ export function RadioPanel({
       aria-label={`Radio of ${device.name}`}
       onSubmit={(e) => {
         e.preventDefault();
-        if (radio) void apply(radio);
+        if (radio && !bad_gain) void apply(radio);
       }}
     >
       <b>Radio of {device.name || device.network_id}.</b>{' '}
@@ -109,15 +113,15 @@ export function RadioPanel({
           <label>
             <span class="lab">Gain, dB</span>
             <input
-              type="number"
-              min="0"
-              max="33.5"
-              step="0.5"
-              value={radio.gain_db ?? ''}
+              inputMode="decimal"
+              value={gain ?? radio.gain_db ?? ''}
+              aria-invalid={bad_gain}
               disabled={!may_change || busy !== ''}
-              onInput={(e) =>
-                set({ ...radio, gain_db: e.currentTarget.value === '' ? null : Number(e.currentTarget.value) })
-              }
+              data-testid="radio-gain"
+              onInput={(e) => {
+                set_gain(e.currentTarget.value);
+                set({ ...radio, gain_db: typed_number(e.currentTarget.value) });
+              }}
             />
           </label>
         </div>
@@ -174,7 +178,7 @@ export function RadioPanel({
           </button>
         )}
         {may_change && (
-          <button class="btn primary" data-testid="radio-apply" disabled={busy !== '' || !radio}>
+          <button class="btn primary" data-testid="radio-apply" disabled={busy !== '' || !radio || bad_gain}>
             {busy === 'set' ? 'Setting and verifying each' : changed ? 'Apply to all and verify' : 'Apply to all again'}
           </button>
         )}
