@@ -90,7 +90,8 @@ Ordered drone_json(const DroneStatus& d) {
           {"peer", d.identity.peer},
           {"link_signed", d.link_signed},
           {"frames_refused", d.frames_refused},
-          {"others", std::move(others)}};
+          {"others", std::move(others)},
+          {"link_trouble", d.link_trouble}};
 }
 
 Ordered flight_command_json(const FlightCommand& c) {

@@ -50,8 +50,11 @@ std::vector<ChecklistItem> make_checklist(const ChecklistFacts& f) {
     for (const auto& name : d.stale) stale += (stale.empty() ? "no telemetry for 5 s: " : ", ") + name;
     for (const auto& refused : d.streams_refused)
       if (!stale.empty()) stale += "; the autopilot refuses " + refused;
-    out.push_back(item("drone", "The aircraft answers", d.connected && !d.failsafe && stale.empty(), false,
-                       !d.connected     ? "no heartbeat"
+    const bool alone = d.link_trouble.empty();
+    out.push_back(item("drone", "The aircraft answers", d.connected && !d.failsafe && stale.empty() && alone,
+                       false,
+                       !alone           ? d.link_trouble
+                       : !d.connected   ? "no heartbeat"
                        : !stale.empty() ? stale
                                         : d.autopilot + ", " + d.mode + (d.failsafe ? ", failsafe" : "")));
     auto arming =

@@ -233,8 +233,12 @@ std::vector<std::pair<std::string_view, std::string>> Operations::alarms() const
     const auto& alarm = flies ? flight_->control.engine().alarm() : std::nullopt;
     out.emplace_back(id, alarm && alarm->id == id ? alarm->text : "");
   }
-  out.emplace_back("drone.taken_over",
-                   flies && flight_->control.taken_over() ? "the pilot or a failsafe has taken over" : "");
+  const std::string who = drone_ == nullptr ? "" : drone_->status().link_trouble;
+  out.emplace_back("drone.taken_over", !flies || !flight_->control.taken_over() ? ""
+                                       : who.empty()
+                                           ? "the pilot or a failsafe has taken over"
+                                           : "nothing is commanded: it is not known whose mode that is");
+  out.emplace_back("drone.identity", who);
   // Until the next flight, or until somebody says that he knows.
   const bool failed = flight_ && flight_->status() == FlightStatus::aborted && flight_->aborted.empty() &&
                       !flight_->control.engine().state().by_person;

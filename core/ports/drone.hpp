@@ -16,9 +16,9 @@ namespace anchord {
 /// What became of a command to the aircraft.
 enum class CommandState : std::uint8_t {
   sent,
-  accepted,     ///< acknowledged, or seen to be done
+  accepted,     ///< seen to be done; of what cannot be seen: acknowledged
   refused,      ///< by the autopilot, with its reason
-  unconfirmed,  ///< neither within 2 s: an alarm; never repeated by itself after that
+  unconfirmed,  ///< not within 2 s, acknowledged or not: an alarm; never repeated by itself after that
 };
 inline constexpr auto k_command_state_words =
     enum_table<CommandState>({{"sent", CommandState::sent},
@@ -39,7 +39,10 @@ struct CommandReport {
 struct OtherOnLink {
   std::string sender;  ///< address and port; empty: the aircraft's own end of the link
   int system{}, component{};
-  std::string kind;  ///< autopilot, ground station, other, unsigned, no MAVLink
+  /// autopilot, fixed wing, VTOL, ground vehicle, boat, submarine, antenna tracker, other vehicle, ground
+  /// station, gimbal, camera, other; of frames that were refused: unsigned, wrong key, clock behind,
+  /// replayed, no MAVLink
+  std::string kind;
   std::uint64_t frames{};
   double silent_s{};
 };
@@ -87,6 +90,8 @@ struct DroneStatus {
   bool link_signed{false};         ///< frames without our key's signature are refused
   std::uint64_t frames_refused{};  ///< unsigned, badly signed, or signed a second time
   std::vector<OtherOnLink> others;
+  /// Why nobody is followed, or that two autopilots answer as one; empty: nothing is wrong with who is heard.
+  std::string link_trouble;
 };
 
 /// A place of the route that the autopilot keeps beside its commands, for the pilot's own screen and for a

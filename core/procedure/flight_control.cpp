@@ -111,6 +111,10 @@ void FlightControl::follow_link(double now_s, const DroneStatus& d) {
     silent_ = true;
     return;
   }
+  // Modes of two aircraft: the first heartbeat of the other looked like a pilot's.
+  if (!taken_over_) explained_ = false;
+  if (taken_over_ && !d.link_trouble.empty() && !std::exchange(explained_, true))
+    engine_.explain_taken_over(now_s, "nothing is commanded: " + d.link_trouble);
   const bool back = std::exchange(silent_, false);
   const auto step = engine_.state().step;
   if (adopts_) {

@@ -136,6 +136,7 @@ void FlightEngine::range(double now_s, NetworkId anchor, bool used, std::optiona
 void FlightEngine::vehicle(double now_s, const VehicleView& view) {
   vehicle_ = view;
   vehicle_s_ = now_s;
+  if (view.position_m) vehicle_m_s_ = now_s;
   was_armed_ |= view.armed;
 }
 
@@ -151,6 +152,11 @@ void FlightEngine::taken_over(double now_s, const std::string& mode) {
   pending_.reset();
   feed(now_s, Trigger::taken_over, mode);
   report(now_s, EventLevel::warning, "drone.taken_over", "the pilot or a failsafe has taken over: " + mode);
+}
+
+void FlightEngine::explain_taken_over(double now_s, const std::string& why) {
+  state_.reason = why;
+  report(now_s, EventLevel::critical, "drone.taken_over", why);
 }
 
 /// What is wrong is judged anew: it was only told of before.
@@ -339,6 +345,7 @@ void FlightEngine::monitor(double now_s) {
   };
   now.position_age_s = fix_m_ ? age(fix_s_) : age(vehicle_s_);
   now.autopilot_m = vehicle_.position_m;
+  if (vehicle_m_s_ && !vehicle_.position_m) now.autopilot_m_age_s = now_s - *vehicle_m_s_;
   now.fix = fix_;
   now.since_good_fix_s = age(good_fix_s_);
   now.autopilot_silent_s = age(vehicle_s_);
@@ -357,7 +364,9 @@ void FlightEngine::monitor(double now_s) {
   // Under way the two are of different moments: the way flown between them is no disagreement.
   limits.disagree_m +=
       vehicle_.speed_mps * std::min(k_late_s + now.position_age_s + now.autopilot_silent_s, k_latest_s);
-  const auto alarm = watch(limits, now);
+  auto alarm = watch(limits, now);
+  // A position that is not known any more agrees with nothing.
+  if (!alarm && alarm_ && alarm_->id == "position.disagree" && !now.autopilot_m) alarm = alarm_;
   if (taken_over_) {
     if (alarm && (!alarm_ || alarm_->id != alarm->id))
       report(now_s, EventLevel::critical, alarm->id, alarm->text);

@@ -111,6 +111,8 @@ class FlightEngine {
   /// The pilot or a failsafe has the aircraft: alarms are told, nothing is reacted to and no time runs out.
   void taken_over(double now_s, const std::string& mode);
   void taken_back(double now_s);
+  /// It was no pilot: why nothing is commanded instead.
+  void explain_taken_over(double now_s, const std::string& why);
   /// Arming or take-off did not happen.
   bool not_taken_off(double now_s, const std::string& why) {
     return feed(now_s, Trigger::not_taken_off, why);
@@ -185,7 +187,7 @@ class FlightEngine {
   State state_;
   PriorBook priors_;
   VehicleView vehicle_;
-  std::optional<double> vehicle_s_, fix_s_, good_fix_s_, started_s_;
+  std::optional<double> vehicle_s_, vehicle_m_s_, fix_s_, good_fix_s_, started_s_;
   std::optional<double>
       watched_s_;  ///< since then it is looked after here: the start, or the restart of the server
   std::optional<Eigen::Vector3d> fix_m_;

@@ -197,6 +197,10 @@ std::optional<Alarm> watch(const SafetyLimits& limits, const Situation& now) {
         Reaction::hold, false, "position.disagree",
         sentence("autopilot and rover disagree by %.1f m", (*now.autopilot_m - *now.position_m).norm())};
   }
+  if (now.autopilot_m_age_s > limits.lost_hold_s) {
+    return Alarm{Reaction::hold, false, "position.disagree",
+                 sentence("the autopilot has not known its position for %.0f s", now.autopilot_m_age_s)};
+  }
   return std::nullopt;
 }
 

@@ -26,6 +26,7 @@ struct SafetyLimits {
   double rtk_hold_s = 2, rtk_return_s = 10;        ///< without at least float
   double link_hold_s = 3, link_return_s = 15;      ///< autopilot silent
   double disagree_m = 3;                           ///< autopilot's position against the rover's
+  double lost_hold_s = 3;                          ///< autopilot answers, and does not know where it is
   double floor_tolerance_m = 0.5;                  ///< below the band by so much, by the rover: climbs
   double low_cell_v = 3.5, critical_cell_v = 3.3;  ///< of a lithium cell under load
 };
@@ -55,6 +56,7 @@ struct Situation {
   std::optional<Eigen::Vector3d> position_m{};  ///< the rover's, else the autopilot's
   double position_age_s{};
   std::optional<Eigen::Vector3d> autopilot_m{};
+  double autopilot_m_age_s{};  ///< 0 while it never said one, or flies by hand
   FixClass fix{FixClass::none};
   double since_good_fix_s{};  ///< without float or fixed
   double autopilot_silent_s{};
@@ -78,8 +80,8 @@ struct Alarm {
 };
 
 /// The gravest thing that is wrong, or nothing. Order: battery critical, battery return margin, fence and
-/// height breach, autopilot silent, position unknown, RTK lost, positions that disagree. docs/procedure.md
-/// has the table.
+/// height breach, autopilot silent, position unknown, RTK lost, positions that disagree, the autopilot's
+/// unknown. docs/procedure.md has the table.
 std::optional<Alarm> watch(const SafetyLimits& limits, const Situation& now);
 
 /// Share of the battery that must be left to reach home with the reserve.

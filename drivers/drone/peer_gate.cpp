@@ -2,20 +2,29 @@
 
 #include <algorithm>
 
+#include "drivers/drone/vehicle_kind.hpp"
+
 namespace anchord::drone {
 namespace {
 
 constexpr double k_peer_silent_s = 10;  ///< the heartbeat comes each second
 constexpr std::size_t k_others = 32;    ///< of a hostile network; the longest silent one is forgotten
 
-bool is_autopilot(const mavlink::Message& m) {
-  // MAV_AUTOPILOT_INVALID (8) and MAV_TYPE_GCS (6) are stations, cameras, gimbals.
-  return m.is("HEARTBEAT") && m.integer("autopilot") != 8 && m.integer("type") != 6;
-}
+constexpr double k_now_s = 5;  ///< what is wrong with the link now was heard within that
 
 std::string kind_of(const mavlink::Message& m) {
-  if (is_autopilot(m)) return "autopilot";
-  return m.is("HEARTBEAT") && m.integer("type") == 6 ? "ground station" : "other";
+  return m.is("HEARTBEAT") ? std::string(kind_of_sender(m)) : "other";
+}
+
+std::string why_refused(const std::string& kind) {
+  if (kind == "unsigned") return "are not signed, and this server has a signing key";
+  if (kind == "wrong key") return "are signed with another key than this server's";
+  if (kind == "clock behind")
+    return "are signed more than a minute ago: the autopilot's clock is not set (it has no GNSS time yet), "
+           "or "
+           "this server's is wrong";
+  if (kind == "replayed") return "are signed with a time that was there before: recorded, and sent again";
+  return "";
 }
 
 }  // namespace
@@ -56,19 +65,26 @@ void PeerGate::note(const std::string& sender, mavlink::Address from, const std:
 /// The frames in it; what was refused is counted, and noted with its sender.
 std::vector<mavlink::Received> PeerGate::read(mavlink::Framer& framer, const std::string& sender,
                                               double now_s, std::span<const std::uint8_t> bytes) {
-  const auto refused = [&] { return framer.counters().unsigned_refused + framer.counters().bad_signature; };
-  const auto before = refused();
+  const auto before = framer.counters();
   std::vector<mavlink::Received> in;
   framer.feed(bytes, in);
-  if (const auto n = refused() - before; n > 0) {
+  const auto& after = framer.counters();
+  if (const auto n =
+          after.unsigned_refused - before.unsigned_refused + after.bad_signature - before.bad_signature;
+      n > 0) {
     refused_ += n;
-    note(sender, {0, 0}, "unsigned", now_s);
+    note(sender, {0, 0},
+         after.wrong_key > before.wrong_key ? "wrong key"
+         : after.behind > before.behind     ? "clock behind"
+         : after.replayed > before.replayed ? "replayed"
+                                            : "unsigned",
+         now_s);
   }
   return in;
 }
 
 bool PeerGate::may_take(const mavlink::Received& heartbeat, const std::string& sender, double now_s) const {
-  if (!is_autopilot(heartbeat.message) || (wanted_ && *wanted_ != sender)) return false;
+  if (!is_our_kind(heartbeat.message) || (wanted_ && *wanted_ != sender)) return false;
   if (!peer_) return true;
   if (now_s - last_seen_s_ <= k_peer_silent_s) return false;
   return !armed_ || heartbeat.from == vehicle_;
@@ -83,7 +99,7 @@ bool PeerGate::admits(double now_s, std::int64_t unix_us, const std::string& sen
   if (!sender.empty()) stranger_.drop_partial();
   bool taken = of_peer;
   for (const auto& one : in) {
-    const bool heartbeat = is_autopilot(one.message);
+    const bool heartbeat = is_our_kind(one.message), beats = one.message.is("HEARTBEAT");
     const bool is_vehicle = of_peer && one.from == vehicle_;
     if (!is_vehicle && may_take(one, sender, now_s)) {
       peer_ = sender;
@@ -93,8 +109,9 @@ bool PeerGate::admits(double now_s, std::int64_t unix_us, const std::string& sen
       others_.erase({sender, one.from.system, one.from.component});
       taken = true;
     }
-    if (taken && one.from == vehicle_) {
+    if (taken && one.from == vehicle_ && (heartbeat || !beats)) {
       if (!heartbeat) continue;
+      others_.erase({sender, one.from.system, one.from.component});
       last_seen_s_ = now_s;
       armed_ = (one.message.integer("base_mode") & 0x80) != 0;
     } else {
@@ -103,6 +120,28 @@ bool PeerGate::admits(double now_s, std::int64_t unix_us, const std::string& sen
   }
   if (in.empty() && !taken && !book_) note(sender, {0, 0}, "no MAVLink", now_s);
   return taken;
+}
+
+std::string PeerGate::trouble(double now_s, bool connected) const {
+  std::string out;
+  double newest_s = now_s - k_now_s;
+  for (const auto& [who, seen] : others_) {
+    const auto& [sender, system, component] = who;
+    const bool itself =
+        peer_ && sender == *peer_ && system == vehicle_.system && component == vehicle_.component;
+    if ((connected && !itself) || seen.last_s < newest_s) continue;
+    std::string why;
+    if (is_another_vehicle(seen.kind)) {
+      why = "system " + std::to_string(system) + (sender.empty() ? "" : " at " + sender) + " is of kind " +
+            seen.kind + ": anchord commands multirotors only, it is not followed";
+    } else if (const auto refused = why_refused(seen.kind); !refused.empty()) {
+      why = "frames " + (sender.empty() ? std::string("on the link") : "of " + sender) + ' ' + refused;
+    }
+    if (why.empty()) continue;
+    out = std::move(why);
+    newest_s = seen.last_s;
+  }
+  return out;
 }
 
 std::vector<OtherOnLink> PeerGate::others(double now_s) const {

@@ -14,7 +14,8 @@
 
 namespace anchord::drone {
 
-/// Who on the link is the aircraft. The first autopilot whose heartbeat is heard is taken, and kept until its
+/// Who on the link is the aircraft. The first autopilot of a multirotor (vehicle_kind.hpp) whose heartbeat is
+/// heard is taken, and kept until its
 /// heartbeat has been missing for 10 s, its connection was closed, or a person changes it; an aircraft that
 /// was armed when it fell silent is followed by its own system id alone. With a key only signed frames count.
 /// Everybody else is counted.
@@ -38,6 +39,10 @@ class PeerGate {
   const mavlink::Address& vehicle() const { return vehicle_; }
   std::vector<OtherOnLink> others(double now_s) const;
   std::uint64_t frames_refused() const { return refused_; }
+  /// Why nobody is followed although somebody was heard within 5 s: a vehicle of another kind, or frames
+  /// whose signature is refused; empty: nothing known. `connected`: the aircraft is heard, and only what it
+  /// says of itself counts.
+  std::string trouble(double now_s, bool connected) const;
 
  private:
   struct Seen {

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "drivers/drone/vehicle_kind.hpp"
+
 namespace anchord::drone {
 namespace {
 
@@ -94,7 +96,7 @@ void Session::keep_alive() {
 
 void Session::on_heartbeat(const mavlink::Received& in) {
   const auto& m = in.message;
-  if (m.integer("autopilot") == 8 || m.integer("type") == 6) return;  // another station
+  if (!is_our_kind(m)) return;  // a station, a tracker, another vehicle
   if (expected_ && in.from != *expected_) return;
   expected_.reset();
   if (last_seen_s_ && in.from != vehicle_) {
@@ -108,7 +110,35 @@ void Session::on_heartbeat(const mavlink::Received& in) {
   telemetry_.receive(m, autopilot_, now_s_);
   custom_mode_ = static_cast<std::uint32_t>(m.integer("custom_mode"));
   if (!telemetry_.armed()) drop_target("the aircraft is disarmed");
+  confirm_shown();
   assess_mode();
+}
+
+/// What the heartbeat shows to be done, acknowledged or not.
+void Session::confirm_shown() {
+  const auto shown = [&](const Pending& p) {
+    return p.number != 0 && ((p.proof == Proof::mode && p.mode == custom_mode_) ||
+                             (p.proof == Proof::disarmed && !telemetry_.armed()));
+  };
+  for (auto it = std::find_if(pending_.begin(), pending_.end(), shown); it != pending_.end();
+       it = std::find_if(pending_.begin(), pending_.end(), shown)) {
+    Pending done = *it;
+    pending_.erase(it);
+    on_answer(done, 0);
+  }
+}
+
+/// The mode that was acknowledged and given up has come after all.
+bool Session::came_late() {
+  auto& f = *flight_;
+  if (!f.late || f.late->mode != custom_mode_ || now_s_ >= f.late->until_s) return false;
+  const Late late = *std::exchange(f.late, std::nullopt);
+  f.passing.erase(late.mode);
+  f.wanted = late.mode;
+  f.ours = f.reached = true;
+  f.former.reset();
+  if (!late.part) report(late.number, late.what, CommandState::accepted, "late");
+  return true;
 }
 
 /// Any mode that was not commanded is the pilot's, or a failsafe's.
@@ -119,32 +149,29 @@ void Session::assess_mode() {
     if (!f.reached && custom_mode_ == dialect_of(autopilot_).guided) f.speed_due = true;
     f.reached = true;
     f.former.reset();
-    for (auto& p : pending_) {
-      if (!p.by_mode || p.number == 0) continue;
-      Pending done = p;
-      done.by_mode = false;
-      std::erase_if(pending_,
-                    [&](const Pending& q) { return q.number == done.number && q.command == done.command; });
-      on_answer(done, 0);
-      break;
-    }
     return;
   }
+  if (came_late()) return;
   const auto passing = f.passing.find(custom_mode_);
   if (passing != f.passing.end() && now_s_ < passing->second) {
     // It has left the mode it was in: who brings it back there is not us.
     if (f.former && *f.former != custom_mode_) f.former.reset();
     return;
   }
-  const bool not_yet = !f.reached && f.former && custom_mode_ == *f.former &&
-                       !(f.acked_s && now_s_ - *f.acked_s > k_mode_shows_s);
+  // A mode of ours that stays, or the one in which it stands disarmed, is nobody's word: the command was not
+  // done. A pilot's, which was there before, is his again.
+  const bool not_yet =
+      !f.reached && f.former && custom_mode_ == *f.former &&
+      (f.former_ours || !telemetry_.armed() || !(f.acked_s && now_s_ - *f.acked_s > k_mode_shows_s));
   if (!not_yet) take_over();
 }
 
 void Session::take_over() {
   flight_->taken_over = true;
-  const std::string why =
-      "the pilot or a failsafe has taken over: " + std::string(mode_word(autopilot_, custom_mode_));
+  const auto two = twins();
+  const std::string why = two.empty() ? "the pilot or a failsafe has taken over: " +
+                                            std::string(mode_word(autopilot_, custom_mode_))
+                                      : two;
   for (const auto& p : std::exchange(pending_, {})) {
     if (!p.part) report(p.number, p.what, CommandState::refused, why);
   }
@@ -160,10 +187,20 @@ void Session::take_back() {
   auto& f = *flight_;
   f.taken_over = false;
   f.wanted = custom_mode_;
+  // Nobody but a station commands these; the others may be the pilot's.
+  const auto kind = mode_kind(autopilot_, custom_mode_);
+  f.ours = kind == ModeKind::guided || kind == ModeKind::hold;
   f.reached = true;
   f.former.reset();
+  f.late.reset();
   f.acked_s.reset();
   f.passing.clear();
+}
+
+std::string Session::twins() const {
+  if (!telemetry_.two_autopilots(now_s_)) return "";
+  return "two autopilots answer as system " + std::to_string(vehicle_.system) +
+         ": switch one off, or give it another id (SYSID_THISMAV, MAV_SYS_ID)";
 }
 
 void Session::tick(double now_s, std::int64_t unix_us) {
@@ -206,6 +243,7 @@ DroneStatus Session::status() const {
   out.mode_kind = last_seen_s_ ? mode_kind(autopilot_, custom_mode_) : ModeKind::other;
   out.taken_over = flight_ && flight_->taken_over;
   out.identity = {"", vehicle_.system, vehicle_.component};
+  out.link_trouble = out.connected ? twins() : "";
   return out;
 }
 

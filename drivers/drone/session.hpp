@@ -14,7 +14,8 @@
 
 namespace anchord::drone {
 
-/// A mode that was accepted shows in the heartbeat by then: PX4 answers before its state machine has run.
+/// A mode that was accepted shows in the heartbeat by then, as a rule: PX4 answers before its state machine
+/// has run.
 inline constexpr double k_mode_shows_s = 1.5;
 
 /// An item of a mission or a fence, as MISSION_ITEM_INT has it.
@@ -38,10 +39,11 @@ struct SessionOptions {
 
 /// One conversation with one autopilot: bytes and time in, bytes out. No socket, no clock, no thread.
 ///
-/// Never trusts an acknowledgement alone: arming, mode and targets are confirmed by telemetry. Whatever was
-/// not confirmed within confirm_s is reported and never sent again by itself. Any mode that was not commanded
-/// in a flight is the pilot's or a failsafe's: what waits is dropped, and no target, take-off or repeat is
-/// sent until take_back().
+/// Never trusts an acknowledgement alone: arming, disarming, mode and targets are confirmed by telemetry.
+/// Whatever was not confirmed within confirm_s is reported and never sent again by itself. Any mode that was
+/// not commanded in a flight is the pilot's or a failsafe's: what waits is dropped, and no target, take-off
+/// or repeat is sent until take_back(). A mode of ours that stays although the next was acknowledged is
+/// neither.
 class Session final : public Drone {
  public:
   explicit Session(SessionOptions options = {});
@@ -79,15 +81,19 @@ class Session final : public Drone {
   const mavlink::Framer::Counters& counters() const { return framer_.counters(); }
 
  private:
-  /// Waits for its answer.
+  /// What shows that it was done.
+  enum class Proof : std::uint8_t { answer, mode, disarmed };
+  /// Waits for its answer, and for its proof.
   struct Pending {
     std::uint64_t number{};
     std::string what;  ///< of the report; part_of_another: mode, arm and climb of a take-off or a target
     mavlink::Message message;
     int command{};
-    bool part{false};     ///< of a command that reports itself
-    bool by_mode{false};  ///< the mode shows that it was done
+    bool part{false};  ///< of a command that reports itself
+    Proof proof{Proof::answer};
+    std::uint32_t mode{};  ///< of Proof::mode
     double first_s{}, last_s{};
+    std::optional<double> acked_s{};  ///< accepted, and not seen to be done yet
   };
   /// An answer names its command's kind only: the oldest of that kind that was sent is the one it answers.
   struct Sent {
@@ -110,13 +116,24 @@ class Session final : public Drone {
     double lat_deg{}, lon_deg{}, height_m{}, begun_s{}, sent_s{}, from_m{};
     bool confirmed{false}, given_up{false};
   };
+  /// A mode that was acknowledged and did not come in its time: perhaps it comes yet.
+  struct Late {
+    std::uint32_t mode{};
+    std::uint64_t number{};
+    std::string what;
+    bool part{false};
+    double until_s{};
+  };
   /// Of one flight, and gone with it.
   struct Flight {
     double speed_mps{};
     bool taken_over{false};
     std::optional<std::uint32_t> wanted{};  ///< the mode that was commanded last
+    bool ours{false};                       ///< `wanted` was commanded, not found
     bool reached{false};
-    std::optional<std::uint32_t> former{};    ///< shown when it was commanded
+    std::optional<std::uint32_t> former{};  ///< shown when it was commanded
+    bool former_ours{false};                ///< and commanded itself
+    std::optional<Late> late{};
     std::optional<double> acked_s{};          ///< the command for it was accepted
     std::map<std::uint32_t, double> passing;  ///< modes commanded before, and until when they may show
     bool speed_due{false};
@@ -144,10 +161,16 @@ class Session final : public Drone {
   void send_command(const mavlink::Message& message, int command, std::uint64_t number);
   mavlink::Message command_long(int command, std::initializer_list<double> params) const;
   void command(std::uint64_t number, const std::string& what, int command,
-               std::initializer_list<double> params, bool part = false, bool by_mode = false);
+               std::initializer_list<double> params, bool part = false, Proof proof = Proof::answer,
+               std::uint32_t mode = 0);
   std::uint64_t mode(const std::string& what, std::uint32_t Dialect::*custom_mode);
   void command_mode(std::uint64_t number, const std::string& what, std::uint32_t custom_mode, bool part);
   void want(std::uint32_t custom_mode);
+  void keep_mode(const Pending& lost);
+  std::string not_done(const Pending& p) const;
+  void confirm_shown();
+  bool came_late();
+  std::string twins() const;
   void keep_alive();
   void assess_mode();
   void take_over();

@@ -30,16 +30,17 @@ Message Session::command_long(int command, std::initializer_list<double> params)
 }
 
 void Session::command(std::uint64_t number, const std::string& what, int command,
-                      std::initializer_list<double> params, bool part, bool by_mode) {
+                      std::initializer_list<double> params, bool part, Proof proof, std::uint32_t mode) {
   // One of a kind at a time: a newer one takes the place of the older.
   for (const auto& p : pending_) {
     if (p.command == command && !p.part)
-      report(p.number, p.what, CommandState::unconfirmed, "followed by " + what + " before it was answered");
+      report(p.number, p.what, CommandState::unconfirmed,
+             "followed by " + what + " before it was " + (p.acked_s ? "done" : "answered"));
   }
   std::erase_if(pending_, [&](const Pending& p) { return p.command == command; });
   Message m = command_long(command, params);
   send_command(m, command, number);
-  pending_.push_back({number, what, std::move(m), command, part, by_mode, now_s_, now_s_});
+  pending_.push_back({number, what, std::move(m), command, part, proof, mode, now_s_, now_s_, {}});
 }
 
 /// A mode number means nothing before it is known whose it is.
@@ -57,8 +58,11 @@ void Session::want(std::uint32_t custom_mode) {
   auto& f = *flight_;
   if (f.wanted && *f.wanted != custom_mode) f.passing[*f.wanted] = now_s_ + k_superseded_s;
   f.passing.erase(custom_mode);
+  f.late.reset();
+  f.former_ours = f.wanted == custom_mode_ ? f.ours : !f.reached && f.former == custom_mode_ && f.former_ours;
   f.former = custom_mode_;
   f.wanted = custom_mode;
+  f.ours = true;
   f.reached = custom_mode_ == custom_mode;
   f.acked_s.reset();
 }
@@ -68,7 +72,28 @@ void Session::command_mode(std::uint64_t number, const std::string& what, std::u
   const bool shown = custom_mode_ == custom_mode;
   want(custom_mode);
   const auto params = mode_params(autopilot_, custom_mode);
-  command(number, what, k_set_mode, {1, params.main, params.sub}, part, !shown);
+  command(number, what, k_set_mode, {1, params.main, params.sub}, part, shown ? Proof::answer : Proof::mode,
+          custom_mode);
+}
+
+/// It was not done: the mode is what it was, and not a pilot's for that. Perhaps the other comes yet.
+void Session::keep_mode(const Pending& lost) {
+  if (!flight_ || lost.command != k_set_mode || flight_->reached || !flight_->wanted) return;
+  auto& f = *flight_;
+  f.passing[*f.wanted] = now_s_ + k_lost_s;
+  if (lost.acked_s && lost.proof == Proof::mode)
+    f.late = Late{lost.mode, lost.number, lost.what, lost.part, now_s_ + k_lost_s};
+  f.wanted = custom_mode_;
+  f.ours = f.former_ours;
+  f.reached = true;
+}
+
+std::string Session::not_done(const Pending& p) const {
+  if (!p.acked_s) return "no answer within 2 s";
+  if (*beat_s_ <= *p.acked_s) return "accepted, but no heartbeat since then shows that it was done";
+  return p.proof == Proof::disarmed
+             ? "accepted, but it stays armed"
+             : "accepted, but it stays in " + std::string(mode_word(autopilot_, custom_mode_));
 }
 
 std::uint64_t Session::mode(const std::string& what, std::uint32_t Dialect::*wanted) {
@@ -91,7 +116,7 @@ std::uint64_t Session::disarm() {
   end_take_off(CommandState::refused, "followed by disarm");
   drop_target("followed by disarm");
   report(number, "disarm", CommandState::sent, "");
-  command(number, "disarm", k_arm, {0, 0});
+  command(number, "disarm", k_arm, {0, 0}, false, telemetry_.armed() ? Proof::disarmed : Proof::answer);
   return number;
 }
 
@@ -117,7 +142,12 @@ void Session::on_ack(const Message& m) {
     return;
   }
   sent_.erase(sent);
-  if (it == pending_.end()) return;  // late: something newer was commanded
+  if (it == pending_.end() || it->acked_s) return;  // late: something newer was commanded; of a repeat
+  if (result == 0 && it->proof != Proof::answer) {
+    it->acked_s = now_s_;
+    if (flight_ && command == k_set_mode) flight_->acked_s = now_s_;
+    return;
+  }
   Pending done = *it;
   pending_.erase(it);
   on_answer(done, result);
@@ -129,6 +159,7 @@ void Session::on_answer(Pending& done, std::int64_t result) {
       flight_->acked_s = now_s_;
     } else {
       flight_->wanted = custom_mode_;  // it stays what it was
+      flight_->ours = flight_->former_ours;
       flight_->reached = true;
     }
   }
@@ -148,21 +179,18 @@ void Session::on_answer(Pending& done, std::int64_t result) {
 void Session::repeat_commands() {
   for (std::size_t i = 0; i < pending_.size();) {
     auto& p = pending_[i];
-    if (now_s_ - p.first_s >= options_.confirm_s) {
+    const double until_s =
+        std::max(p.first_s + options_.confirm_s, p.acked_s ? *p.acked_s + k_mode_shows_s : 0);
+    if (now_s_ >= until_s) {
       const Pending lost = p;
       pending_.erase(pending_.begin() + static_cast<std::ptrdiff_t>(i));
-      if (flight_ && lost.command == k_set_mode && !flight_->reached && flight_->wanted) {
-        // Perhaps it comes yet; until it shows, the mode is what it was.
-        flight_->passing[*flight_->wanted] = now_s_ + k_lost_s;
-        flight_->wanted = custom_mode_;
-        flight_->reached = true;
-      }
-      if (!lost.part) report(lost.number, lost.what, CommandState::unconfirmed, "no answer within 2 s");
+      keep_mode(lost);
+      if (!lost.part) report(lost.number, lost.what, CommandState::unconfirmed, not_done(lost));
       continue;
     }
     // What changes the mode waits for a heartbeat: it would show that the pilot has changed it meanwhile.
     const bool changes_mode = p.command == k_set_mode || p.command == k_reposition || p.command == k_take_off;
-    if (now_s_ - p.last_s >= options_.repeat_s && (!changes_mode || *beat_s_ > p.last_s)) {
+    if (!p.acked_s && now_s_ - p.last_s >= options_.repeat_s && (!changes_mode || *beat_s_ > p.last_s)) {
       p.last_s = now_s_;
       if (p.message.is("COMMAND_LONG")) p.message.set("confirmation", p.message.integer("confirmation") + 1);
       send_command(p.message, p.command, p.number);

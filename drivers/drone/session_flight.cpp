@@ -47,8 +47,8 @@ std::uint64_t Session::take_off(double above_ground_m) {
     return refuse("the height must be above 0 and at most 120 m");
   if (!flight_) return refuse("nothing is being flown");
   if (flight_->taken_over) return refuse("the pilot or a failsafe has taken over");
-  if (!telemetry_.fresh("GLOBAL_POSITION_INT", now_s_, 3))
-    return refuse("the autopilot does not report its position");
+  if (!telemetry_.has_position(now_s_, 3)) return refuse("the autopilot does not report its position");
+  if (const auto two = twins(); !two.empty()) return refuse(two);
   end_take_off(CommandState::refused, "followed by another take-off");
   TakeOff t;
   t.number = number;
@@ -93,7 +93,7 @@ void Session::drive_take_off() {
   if (t.stage == Stage::mode && (custom_mode_ == d.guided || d.take_off_above_sea)) next_stage(t, Stage::arm);
   if (t.stage == Stage::arm && telemetry_.armed()) next_stage(t, Stage::climb);
   const double risen_m = telemetry_.newest().relative_m.value_or(t.from_m) - t.from_m;
-  if (t.stage == Stage::climb && telemetry_.fresh("GLOBAL_POSITION_INT", now_s_, 3) && risen_m > k_risen_m) {
+  if (t.stage == Stage::climb && telemetry_.has_position(now_s_, 3) && risen_m > k_risen_m) {
     if (custom_mode_ == d.guided || custom_mode_ == d.climbing)
       return end_take_off(CommandState::accepted, "in the air");
     // It flies, and its heartbeat still shows the mode in which it stood: the pilot has it back.
@@ -168,8 +168,7 @@ std::uint64_t Session::go_to(double lat_deg, double lon_deg, double height_m,
   if (flight_->taken_over)
     return refuse("the pilot or a failsafe has taken over: " +
                   std::string(mode_word(autopilot_, custom_mode_)));
-  if (!telemetry_.fresh("GLOBAL_POSITION_INT", now_s_, 5))
-    return refuse("the autopilot does not report its position");
+  if (!telemetry_.has_position(now_s_, 5)) return refuse("the autopilot does not report its position");
   if (!telemetry_.armed()) return refuse("the aircraft is disarmed");
   if (const double m = distance_m(lat_deg, lon_deg, height_m); m > options_.max_jump_m) {
     return refuse("the target is " + std::to_string(std::lround(m)) + " m away");
@@ -184,7 +183,7 @@ std::uint64_t Session::go_to(double lat_deg, double lon_deg, double height_m,
     want(d.guided);
     std::erase_if(pending_, [](const Pending& p) { return p.command == k_reposition; });
     send_command(m, k_reposition, number);
-    pending_.push_back({number, "go_to", m, k_reposition, true, false, now_s_, now_s_});
+    pending_.push_back({number, "go_to", m, k_reposition, true, Proof::answer, 0, now_s_, now_s_, {}});
   } else if (flight_->wanted != d.guided || custom_mode_ != d.guided) {
     // After a hold, perhaps one that the heartbeat does not show yet: targets outside GUIDED are ignored in
     // silence.

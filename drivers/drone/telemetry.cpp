@@ -13,6 +13,16 @@ using mavlink::Message;
 constexpr double k_ask_again_s = 3, k_stale_s = 5, k_answer_s = 0.6, k_pace_s = 0.1;
 constexpr int k_tries = 5, k_armed = 0x80, k_on_ground = 1;
 constexpr std::int64_t k_prearm_bit = 0x10000000;  // MAV_SYS_STATUS_PREARM_CHECK
+constexpr double k_highest_m = 100'000;            ///< INT32_MIN and INT32_MAX mm say that there is no height
+
+/// None: an estimator without an origin says 0, 0; what has no place on earth is nobody's.
+std::optional<Wgs84> place_of(const Message& m) {
+  const Wgs84 at{m.real("lat") * 1e-7, m.real("lon") * 1e-7, m.real("alt") * 1e-3};
+  const bool nowhere = (at.lat_deg == 0 && at.lon_deg == 0) || std::abs(at.lat_deg) > 90 ||
+                       std::abs(at.lon_deg) > 180 || std::abs(at.height_m) > k_highest_m ||
+                       std::abs(m.real("relative_alt") * 1e-3) > k_highest_m;
+  return nowhere ? std::nullopt : std::optional(at);
+}
 
 }  // namespace
 
@@ -59,7 +69,7 @@ void Telemetry::restarted() {
   status_.not_ready.clear();
   status_.battery_warning = 0;
   landed_ = 0;
-  battery_s_ = warning_s_ = -1e9;
+  position_s_ = battery_s_ = warning_s_ = -1e9;
 }
 
 void Telemetry::receive_status_text(const Message& m, double now_s) {
@@ -94,6 +104,25 @@ void Telemetry::receive_battery(const Message& m, double now_s) {
   status_.battery_warning = state >= 3 && state <= 6 ? 2 : state == 2 ? 1 : 0;
 }
 
+void Telemetry::receive_position(const Message& m, double now_s) {
+  const auto boot_ms = m.integer("time_boot_ms");
+  const auto place = place_of(m);
+  twins_.position(now_s, boot_ms, place);
+  if (boot_ms + 1000 < boot_ms_ && !twins_.two(now_s)) {
+    restarted();
+    streams_[0].last_seen_s = now_s;
+  }
+  boot_ms_ = boot_ms;
+  // UINT16_MAX: not known; hundredths of a degree.
+  const auto heading = m.integer("hdg");
+  status_.heading_deg = heading <= 36'000 ? std::optional(m.real("hdg") / 100) : std::nullopt;
+  if (!place) return;
+  status_.position = place;
+  status_.relative_m = m.real("relative_alt") * 1e-3;
+  status_.speed_mps = std::hypot(m.real("vx"), m.real("vy"), m.real("vz")) / 100;
+  position_s_ = now_s;
+}
+
 void Telemetry::receive_parameter(const Message& m, Autopilot autopilot) {
   const auto it = parameters_.find(m.text("param_id"));
   if (it == parameters_.end()) return;
@@ -116,18 +145,9 @@ void Telemetry::receive(const Message& m, Autopilot autopilot, double now_s) {
   if (m.is("HEARTBEAT")) {
     status_.armed = (m.integer("base_mode") & k_armed) != 0;
     status_.failsafe = m.integer("system_status") >= 5;  // MAV_STATE_CRITICAL
+    twins_.heartbeat(now_s, status_.armed);
   } else if (m.is("GLOBAL_POSITION_INT")) {
-    const auto boot_ms = m.integer("time_boot_ms");
-    if (boot_ms + 1000 < boot_ms_) {
-      restarted();
-      streams_[0].last_seen_s = now_s;
-    }
-    boot_ms_ = boot_ms;
-    const double lat = m.real("lat") * 1e-7, lon = m.real("lon") * 1e-7;
-    if (lat != 0 || lon != 0) status_.position = Wgs84{lat, lon, m.real("alt") * 1e-3};
-    status_.relative_m = m.real("relative_alt") * 1e-3;
-    status_.speed_mps = std::hypot(m.real("vx"), m.real("vy"), m.real("vz")) / 100;
-    if (m.integer("hdg") != 65535) status_.heading_deg = m.real("hdg") / 100;
+    receive_position(m, now_s);
   } else if (m.is("GPS_RAW_INT")) {
     status_.gps_fix = static_cast<int>(m.integer("fix_type"));
   } else if (m.is("SYS_STATUS") || m.is("BATTERY_STATUS")) {
@@ -196,11 +216,15 @@ void Telemetry::fill(DroneStatus& out, double now_s) const {
   const auto age = [&](double since_s) {
     return since_s < -1e8 ? std::numeric_limits<double>::infinity() : now_s - since_s;
   };
-  out.position_age_s = age(streams_[0].last_seen_s);
+  out.position_age_s = age(position_s_);
   out.battery_age_s = age(battery_s_);
   for (const auto& s : streams_) {
     const double since_s = std::max(s.last_seen_s, first_s_.value_or(now_s));
-    if (s.watched && now_s - since_s > k_stale_s) out.stale.emplace_back(s.name);
+    const double place_s = std::max(position_s_, first_s_.value_or(now_s));
+    if (s.watched && now_s - since_s > k_stale_s)
+      out.stale.emplace_back(s.name);
+    else if (&s == &streams_[0] && now_s - place_s > k_stale_s)
+      out.stale.push_back(std::string(s.name) + " (it comes, and says no place)");
     if (s.result != 0) out.streams_refused.push_back(std::string(s.name) + ": " + result_word(s.result));
   }
   for (const auto& [name, p] : parameters_) {

@@ -10,6 +10,7 @@
 
 #include "core/ports/drone.hpp"
 #include "drivers/drone/dialect.hpp"
+#include "drivers/drone/twin_watch.hpp"
 #include "drivers/mavlink/message.hpp"
 
 namespace anchord::drone {
@@ -17,7 +18,8 @@ namespace anchord::drone {
 /// What the autopilot tells of itself, each stream with its age. A stream that is older than 3 s is asked for
 /// again (an autopilot that was restarted sends nothing but its heartbeat), one at a time so that the answers
 /// can be told apart; one that is refused is shown, and asked for as part of its group where the autopilot
-/// has groups; older than 5 s it is stale. Parameters are asked for one by one.
+/// has groups; older than 5 s it is stale. Parameters are asked for one by one. A GLOBAL_POSITION_INT that
+/// says no place, or none on earth, is no position: the last one ages.
 class Telemetry {
  public:
   Telemetry();
@@ -30,6 +32,8 @@ class Telemetry {
   void fill(DroneStatus& out, double now_s) const;
   const DroneStatus& newest() const { return status_; }
   bool fresh(std::string_view stream, double now_s, double within_s) const;
+  bool has_position(double now_s, double within_s) const { return now_s - position_s_ <= within_s; }
+  bool two_autopilots(double now_s) const { return twins_.two(now_s); }
   std::optional<double> home_msl_m() const;
   bool armed() const { return status_.armed; }
   bool in_air(double now_s) const;
@@ -56,6 +60,7 @@ class Telemetry {
 
   void restarted();
   void receive_status_text(const mavlink::Message& m, double now_s);
+  void receive_position(const mavlink::Message& m, double now_s);
   void receive_battery(const mavlink::Message& m, double now_s);
   void receive_parameter(const mavlink::Message& m, Autopilot autopilot);
 
@@ -63,10 +68,11 @@ class Telemetry {
   std::array<Stream, 7> streams_;
   std::map<std::string, Parameter> parameters_;
   std::optional<double> first_s_;
-  double battery_s_{-1e9}, question_s_{-1e9}, warning_s_{-1e9};
+  double position_s_{-1e9}, battery_s_{-1e9}, question_s_{-1e9}, warning_s_{-1e9};
   std::optional<std::size_t> open_;  ///< stream whose question has no answer yet
   std::int64_t boot_ms_{0}, landed_{0};
   std::string warning_;
+  TwinWatch twins_;
 };
 
 }  // namespace anchord::drone

@@ -137,8 +137,12 @@ std::size_t Framer::take(std::span<const std::uint8_t> bytes, std::vector<Receiv
       ++counters_.unsigned_refused;
       return whole;
     }
-    if (!book_->accepts(bytes.first(whole))) {
+    using Verdict = SignatureBook::Verdict;
+    if (const auto verdict = book_->judge(bytes.first(whole)); verdict != Verdict::good) {
       ++counters_.bad_signature;
+      ++(verdict == Verdict::wrong_key ? counters_.wrong_key
+         : verdict == Verdict::behind  ? counters_.behind
+                                       : counters_.replayed);
       return whole;
     }
   }
@@ -150,24 +154,24 @@ std::size_t Framer::take(std::span<const std::uint8_t> bytes, std::vector<Receiv
   return whole;
 }
 
-bool SignatureBook::accepts(std::span<const std::uint8_t> frame) {
+SignatureBook::Verdict SignatureBook::judge(std::span<const std::uint8_t> frame) {
   const auto signature = frame.last(k_signature);
   const auto wanted = signature_of(secret_, frame.first(frame.size() - 6));
-  if (!std::equal(wanted.begin(), wanted.end(), signature.begin() + 7)) return false;
+  if (!std::equal(wanted.begin(), wanted.end(), signature.begin() + 7)) return Verdict::wrong_key;
   constexpr std::uint64_t k_minute = 6'000'000;  // 10 us units
   const std::uint64_t time = time_of(signature);
   const std::pair<Address, std::uint8_t> stream{{frame[5], frame[6]}, signature[0]};
   const auto known = streams_.find(stream);
   if (known == streams_.end()) {
-    if (time + k_minute < now_ || streams_.size() >= k_max_senders) return false;
+    if (time + k_minute < now_ || streams_.size() >= k_max_senders) return Verdict::behind;
     streams_[stream] = time;
   } else if (time <= known->second) {
-    return false;  // a replay
+    return Verdict::replayed;
   } else {
     known->second = time;
   }
   newest_ = std::max(newest_, time);
-  return true;
+  return Verdict::good;
 }
 
 void Framer::count_sequence(Address from, std::uint8_t sequence) {

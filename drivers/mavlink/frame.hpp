@@ -56,10 +56,12 @@ class Packer {
 /// most one minute behind. Shared by framers that read pieces of one link.
 class SignatureBook {
  public:
+  enum class Verdict : std::uint8_t { good, wrong_key, behind, replayed };
+
   explicit SignatureBook(const Secret& secret) : secret_(secret) {}
   void set_time(std::uint64_t now) { now_ = now; }
   /// Enters the frame's time stamp when its signature is good.
-  bool accepts(std::span<const std::uint8_t> frame);
+  Verdict judge(std::span<const std::uint8_t> frame);
   /// The newest time stamp accepted: ours must not be behind it.
   std::uint64_t newest() const { return newest_; }
 
@@ -79,6 +81,8 @@ class Framer {
   struct Counters {
     std::uint64_t received{}, bad_sum{}, bad_flag{}, bad_signature{}, unsigned_refused{}, unknown{}, lost{};
     std::uint64_t skipped_bytes{};
+    /// Of bad_signature: of another key; more than a minute old; not newer than the one before.
+    std::uint64_t wrong_key{}, behind{}, replayed{};
   };
 
   /// From now on only frames with this signature count; the time stamp must grow per sender and link. A new

@@ -34,7 +34,9 @@ struct AutopilotOptions {
   double loss_in = 0;              ///< of each frame sent to it
   double latency_s = 0;            ///< of the link, each way
   double ack_delay_s = 0, ack_loss = 0;
-  double mode_lag_s = 0;  ///< the heartbeat shows a mode so much later
+  double mode_lag_s = 0;      ///< the heartbeat shows a mode so much later
+  bool does_nothing = false;  ///< every command is acknowledged and none is done
+  bool no_place = false;      ///< its estimator has no origin: latitude and longitude are 0
   /// What it believes of its place against the truth: ordinary GNSS, and a barometer that drifts.
   Eigen::Vector3d gnss_offset_m{0, 0, 0};
   double baro_drift_mps = 0, baro_drift_max_m = 10;

@@ -29,7 +29,7 @@ void AutopilotSim::handle(const Message& m, mavlink::Address from) {
          options_.ack_delay_s);
   } else if (m.is("SET_POSITION_TARGET_GLOBAL_INT")) {
     // Outside GUIDED targets are ignored in silence, as ArduPilot does.
-    if (custom_mode_ != d.guided || options_.dialect == drone::Autopilot::px4 ||
+    if (options_.does_nothing || custom_mode_ != d.guided || options_.dialect == drone::Autopilot::px4 ||
         m.integer("coordinate_frame") != 6)
       return;
     const bool with_yaw = (m.integer("type_mask") & 1024) == 0;
@@ -152,6 +152,7 @@ int AutopilotSim::set_interval(const Message& m) {
 
 int AutopilotSim::run_command(const Message& m) {
   const bool px4 = options_.dialect == drone::Autopilot::px4;
+  if (options_.does_nothing && m.integer("command") != 511) return k_accepted;
   switch (m.integer("command")) {
     case 176:  // DO_SET_MODE
       set_mode(px4 ? static_cast<std::uint32_t>(m.integer("param2")) << 16U |

@@ -36,8 +36,8 @@ Message AutopilotSim::telemetry_message(int id) const {
     case 33:
       return Message("GLOBAL_POSITION_INT")
           .set("time_boot_ms", ms)
-          .set("lat", e7(here.lat_deg))
-          .set("lon", e7(here.lon_deg))
+          .set("lat", options_.no_place ? 0 : e7(here.lat_deg))
+          .set("lon", options_.no_place ? 0 : e7(here.lon_deg))
           .set("alt", std::llround((here.height_m - options_.geoid_m) * 1000))
           .set("relative_alt", std::llround((at.z() - home_m_.z()) * 1000))
           .set("vx", std::llround(v.y()))

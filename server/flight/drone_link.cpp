@@ -241,7 +241,9 @@ DroneStatus DroneLink::status() const {
   out.identity.peer = now->gate.peer().value_or("");
   out.link_signed = impl_->is_signed;
   out.frames_refused = now->gate.frames_refused();
-  out.others = now->gate.others(seconds(link::arrival_now()));
+  const double now_s = seconds(link::arrival_now());
+  out.others = now->gate.others(now_s);
+  if (out.link_trouble.empty()) out.link_trouble = now->gate.trouble(now_s, out.connected);
   return out;
 }
 std::vector<CommandReport> DroneLink::take_reports() {

@@ -40,6 +40,10 @@ describe('a message of the procedure', () => {
     expect(
       procedure({ mission: 'm', drone: { streams_refused: ['SYS_STATUS: unsupported'] } })!.drone!.streams_refused,
     ).toEqual(['SYS_STATUS: unsupported']));
+  it('shows why nobody is followed on the link', () =>
+    expect(procedure({ mission: 'm', drone: { link_trouble: 'two autopilots' } })!.drone!.link_trouble).toBe(
+      'two autopilots',
+    ));
   it('drops the choice of a decision whose candidates did not all arrive whole', () => {
     const c = { lon: 1, lat: 2, value: 3 };
     expect(grid({ mission: 'm', candidates: [c, c], chosen: 1 })!.chosen).toBe(1);

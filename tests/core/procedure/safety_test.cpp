@@ -108,6 +108,12 @@ TEST(SafetyWatch, HasTheReactionsOfTheDocumentation) {
   now = well();
   now.autopilot_m = Vector3d(-10, -6, 5);
   expect(now, Reaction::hold, "position.disagree");
+  now = well();
+  now.autopilot_m.reset();
+  now.autopilot_m_age_s = 2.9;
+  EXPECT_FALSE(watch(hall(), now));
+  now.autopilot_m_age_s = 3.1;
+  expect(now, Reaction::hold, "position.disagree");
 }
 
 TEST(SafetyWatch, SaysNothingOnTheGroundOrWithinTheTolerance) {

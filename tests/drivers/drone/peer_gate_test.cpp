@@ -131,10 +131,12 @@ TEST(PeerGate, WithAKeyOnlySignedFramesTakeTheLinkAndAReplayDoesNot) {
   const auto stamp = mavlink::signature_time(k_signed_us);
   Packer copter({1, 1}), forger({1, 1}), other({1, 1});
   EXPECT_FALSE(link.receive(k_stranger, forger.pack(heartbeat())));
+  EXPECT_EQ(link.gate.others(link.now).front().kind, "unsigned");
   mavlink::Secret wrong{};
   other.sign_with(wrong, 0, stamp);
   EXPECT_FALSE(link.receive(k_stranger, other.pack(heartbeat())));
   EXPECT_EQ(link.gate.frames_refused(), 2u);
+  EXPECT_EQ(link.gate.others(link.now).front().kind, "wrong key");
   copter.sign_with(key, 0, stamp);
   const auto first = copter.pack(heartbeat());
   EXPECT_TRUE(link.receive(k_aircraft, first));
@@ -143,7 +145,99 @@ TEST(PeerGate, WithAKeyOnlySignedFramesTakeTheLinkAndAReplayDoesNot) {
   link.now = 31;
   copter.set_time(stamp + 3'100'000);
   EXPECT_TRUE(link.receive("192.0.2.10:50001", copter.pack(heartbeat())));
-  EXPECT_EQ(link.gate.others(link.now).front().kind, "unsigned");
+  EXPECT_EQ(link.gate.others(link.now).front().kind, "replayed");
+}
+
+TEST(PeerGate, SaysWhyASignedLinkHearsNobody) {
+  mavlink::Secret key{}, another{};
+  key.fill(9);
+  another.fill(8);
+  const auto stamp = mavlink::signature_time(k_signed_us);
+  Link link(key);
+  EXPECT_EQ(link.gate.trouble(link.now, false), "") << "nobody has spoken";
+  Packer plain({1, 1}), wrong({1, 1}), unset({1, 1});
+  wrong.sign_with(another, 0, stamp);
+  unset.sign_with(key, 0, 1000);  // switched on indoors: its clock begins in 2015
+  const auto says = [&](const char* words) {
+    const auto why = link.gate.trouble(link.now, false);
+    return why.find(words) != std::string::npos && why.find(k_aircraft) != std::string::npos
+               ? ::testing::AssertionSuccess()
+               : ::testing::AssertionFailure() << why;
+  };
+  EXPECT_FALSE(link.receive(k_aircraft, plain.pack(heartbeat())));
+  EXPECT_TRUE(says("are not signed"));
+  EXPECT_FALSE(link.receive(k_aircraft, wrong.pack(heartbeat())));
+  EXPECT_TRUE(says("another key"));
+  EXPECT_FALSE(link.receive(k_aircraft, unset.pack(heartbeat())));
+  EXPECT_TRUE(says("clock is not set"));
+  link.now = 6;
+  EXPECT_EQ(link.gate.trouble(link.now, false), "") << "it has been silent since";
+  unset.set_time(stamp + 600'000);
+  EXPECT_TRUE(link.receive(k_aircraft, unset.pack(heartbeat()))) << "GNSS has set its clock";
+  EXPECT_FALSE(link.receive(k_stranger, wrong.pack(heartbeat())));
+  EXPECT_EQ(link.gate.trouble(link.now, true), "") << "a stranger is no trouble while the aircraft is heard";
+}
+
+// MAV_TYPE of MAVLink's minimal.xml; the autopilot is ArduPilot in all of them.
+Message of_type(int type) { return heartbeat().set("type", type); }
+
+TEST(PeerGate, OnlyMultirotorsAreFollowed) {
+  for (const int type : {2, 3, 4, 13, 14, 15, 29, 35, 43}) {
+    Link link;
+    Packer one({1, 1});
+    EXPECT_TRUE(link.receive(k_aircraft, one.pack(of_type(type)))) << type;
+  }
+  for (const auto& [type, kind] : {std::pair{1, "fixed wing"},
+                                   {5, "antenna tracker"},
+                                   {10, "ground vehicle"},
+                                   {11, "boat"},
+                                   {12, "submarine"},
+                                   {7, "other vehicle"},
+                                   {0, "other vehicle"},
+                                   {20, "VTOL"},
+                                   {22, "VTOL"}}) {
+    Link link;
+    Packer one({7, 1});
+    EXPECT_FALSE(link.receive(k_aircraft, one.pack(of_type(type)))) << type;
+    EXPECT_FALSE(link.gate.peer()) << type;
+    ASSERT_EQ(link.gate.others(0).size(), 1u);
+    EXPECT_EQ(link.gate.others(0).front().kind, kind);
+    EXPECT_EQ(link.gate.trouble(0, false), "system 7 at " + k_aircraft + " is of kind " + kind +
+                                               ": anchord commands multirotors only, it is not followed");
+  }
+  for (const auto& [type, kind] :
+       {std::pair{6, "ground station"}, {26, "gimbal"}, {30, "camera"}, {18, "other"}}) {
+    Link link;
+    Packer one({1, 154});
+    EXPECT_FALSE(link.receive(k_aircraft, one.pack(of_type(type)))) << type;
+    EXPECT_EQ(link.gate.others(0).front().kind, kind);
+    EXPECT_EQ(link.gate.trouble(0, false), "") << "it stands in for no aircraft: " << kind;
+  }
+}
+
+TEST(PeerGate, AnAntennaTrackerNeverTakesTheAircraftsPlace) {
+  Link link;
+  Packer tracker({2, 1}), copter({1, 1});
+  EXPECT_FALSE(link.receive("", tracker.pack(of_type(5)))) << "heard first";
+  EXPECT_TRUE(link.receive("", copter.pack(heartbeat())));
+  EXPECT_EQ(link.gate.vehicle(), (Address{1, 1}));
+  for (link.now = 1; link.now < 30; link.now += 1) link.receive("", tracker.pack(of_type(5)));
+  EXPECT_EQ(link.gate.vehicle(), (Address{1, 1})) << "its battery is being changed";
+  EXPECT_TRUE(link.receive("", copter.pack(heartbeat())));
+  EXPECT_EQ(link.gate.vehicle(), (Address{1, 1}));
+}
+
+TEST(PeerGate, AnAircraftThatNamesItselfAPlaneIsFollowedNoLonger) {
+  Link link;
+  Packer one({1, 1}), other({1, 1});
+  ASSERT_TRUE(link.receive(k_aircraft, one.pack(heartbeat())));
+  link.now = 1;
+  link.receive(k_aircraft, one.pack(of_type(1)));
+  EXPECT_NE(link.gate.trouble(link.now, true).find("fixed wing"), std::string::npos)
+      << link.gate.trouble(link.now, true);
+  link.now = 10.5;  // of its last heartbeat as a copter
+  link.receive(k_aircraft, one.pack(of_type(1)));
+  EXPECT_TRUE(link.receive(k_stranger, other.pack(heartbeat())));
 }
 
 TEST(SigningKey, IsHexadecimalOrRawAndItsFileIsTheOwnersAlone) {

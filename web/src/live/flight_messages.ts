@@ -169,6 +169,7 @@ export function drone(v: Unchecked<Aircraft>): DroneMsg | null {
       link_signed: d.link_signed === true,
       frames_refused: count(d.frames_refused),
       streams_refused: texts(d.streams_refused),
+      link_trouble: str(d.link_trouble),
       others: objects(d.others).map((o) => ({
         sender: str(o.sender),
         system: count(o.system),

@@ -208,6 +208,11 @@ function Aircraft({ drone: d }: { drone: DroneMsg | null }) {
               <dd>{d.silent_s === null ? 'never' : `${age(d.silent_s * 1000)} ago`}</dd>
             </div>
           </dl>
+          {d.link_trouble !== '' && (
+            <div class="callout caution" role="status">
+              <b>{d.link_trouble}</b>
+            </div>
+          )}
           {d.frames_refused > 0 && (
             <div class="callout caution" role="status">
               <b>{d.frames_refused} frames rejected.</b> Unsigned, or signed with another key: somebody else sends on

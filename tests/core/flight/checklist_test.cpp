@@ -1,0 +1,58 @@
+// What keeps the checklist from being green, and in which words.
+#include "core/flight/checklist.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+namespace anchord::flight::checklist_test {
+namespace {
+
+DroneStatus hears() {
+  DroneStatus d;
+  d.connected = true;
+  d.autopilot = "ArduPilot";
+  d.mode = "STABILIZE";
+  d.position_age_s = 0.1;
+  return d;
+}
+
+ChecklistItem drone_item(const DroneStatus& d) {
+  ChecklistFacts facts;
+  facts.drone = d;
+  const auto list = make_checklist(facts);
+  return *std::find_if(list.begin(), list.end(), [](const auto& i) { return i.id == "drone"; });
+}
+
+TEST(Checklist, TheAircraftThatAnswersAloneIsGreen) {
+  const auto item = drone_item(hears());
+  EXPECT_TRUE(item.green());
+  EXPECT_EQ(item.detail, "ArduPilot, STABILIZE");
+}
+
+TEST(Checklist, TwoThatAnswerAsOneAreNotGreenAndNobodyOverridesThat) {
+  auto d = hears();
+  d.link_trouble = "two autopilots answer as system 1";
+  const auto item = drone_item(d);
+  EXPECT_FALSE(item.green());
+  EXPECT_FALSE(item.overridable);
+  EXPECT_EQ(item.detail, "two autopilots answer as system 1");
+}
+
+TEST(Checklist, SaysWhyNobodyIsFollowed) {
+  DroneStatus d;
+  EXPECT_EQ(drone_item(d).detail, "no heartbeat");
+  d.link_trouble = "system 7 is of kind fixed wing: anchord commands multirotors only, it is not followed";
+  EXPECT_FALSE(drone_item(d).green());
+  EXPECT_EQ(drone_item(d).detail, d.link_trouble);
+}
+
+TEST(Checklist, APositionThatIsNoneIsNotGreen) {
+  auto d = hears();
+  d.stale = {"GLOBAL_POSITION_INT (it comes, and says no place)"};
+  EXPECT_FALSE(drone_item(d).green());
+  EXPECT_NE(drone_item(d).detail.find("says no place"), std::string::npos) << drone_item(d).detail;
+}
+
+}  // namespace
+}  // namespace anchord::flight::checklist_test
