@@ -4,7 +4,7 @@
 #include <deque>
 #include <optional>
 
-#include "core/types/position.hpp"
+#include "core/ports/drone.hpp"
 
 namespace anchord::drone {
 
