@@ -76,6 +76,7 @@ class Pipeline::Device final : public DriverOutput {
   void dropped(std::string_view reason, std::uint64_t n) override {
     owner_.sink_.dropped(slot_, to_utf8(reason, k_most_word), n);
   }
+  void notice(std::string_view text) override { owner_.sink_.notice(slot_, to_utf8(text, k_most_reason)); }
   void answer(std::uint64_t id, Result<std::string> json) override {
     if (!json) json = make_error(json.error().code, to_utf8(json.error().message));
     owner_.sink_.answer(slot_, id, json);

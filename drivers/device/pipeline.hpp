@@ -29,6 +29,7 @@ class PipelineSink {
   virtual void base(std::uint16_t slot, const BaseStation& station) { (void)slot, (void)station; }
   virtual void heard(std::uint16_t slot) = 0;
   virtual void dropped(std::uint16_t slot, std::string_view reason, std::uint64_t n) = 0;
+  virtual void notice(std::uint16_t slot, std::string_view text) { (void)slot, (void)text; }
   virtual void answer(std::uint16_t slot, std::uint64_t command_id, const Result<std::string>& json) = 0;
   virtual void hang_up(std::uint16_t slot, std::string_view why, std::int64_t wait_ns) = 0;
 };

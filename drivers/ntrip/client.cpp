@@ -17,6 +17,16 @@ constexpr std::int64_t k_second_ns = 1'000'000'000;
 constexpr std::int64_t k_answer_ns = 10 * k_second_ns, k_position_ns = 10 * k_second_ns;
 constexpr std::size_t k_most_head = 16'384;
 constexpr std::size_t k_most_chunk = 1 << 20;
+/// Without one good frame in so many bytes the stream is no RTCM 3: a minute of the busiest mounts.
+constexpr std::size_t k_most_noise = 64 << 10;
+/// Of good frames: three times what all satellites at 5 Hz need. A caster that sends more would fill the link
+/// of the receiver, and its positions would be lost with it.
+constexpr double k_rate_bytes_per_s = 32 << 10, k_burst_bytes = 64 << 10;
+constexpr std::uint64_t k_worth_telling = 2048;  ///< more than the half frame a stream may begin with
+
+constexpr const char* k_web_page =
+    "the caster sends a web page (HTML): check address, port and mount, or sign in to this network's login "
+    "page";
 
 std::string lower(std::string text) {
   std::transform(text.begin(), text.end(), text.begin(),
@@ -84,7 +94,12 @@ void Client::opened(const device::Arrival& now) {
   chunked_ = is_table_ = false;
   chunk_left_ = 0;
   frames_ = {};
-  skipped_ = 0;
+  skipped_ = handed_on_ = 0;
+  since_frame_ = 0;
+  noise_.clear();
+  budget_ = k_burst_bytes;
+  budget_at_ns_ = now.steady_ns;
+  too_many_ = false;
   deadline_ns_ = now.steady_ns + k_answer_ns;
   std::string request =
       "GET /" + options_.mount + (options_.version == 1 ? " HTTP/1.0\r\n" : " HTTP/1.1\r\n");
@@ -115,7 +130,7 @@ void Client::refuse(const std::string& why, std::int64_t wait_s) {
 
 void Client::bytes(std::string_view bytes, const device::Arrival& at) {
   if (state_ == State::closed || state_ == State::refused) return;
-  if (state_ == State::stream) return stream(bytes);
+  if (state_ == State::stream) return stream(bytes, at);
   held_ += bytes;
   if (held_.size() > k_most_head && state_ != State::table)
     return refuse("the caster's answer is not NTRIP", 30);
@@ -181,6 +196,9 @@ void Client::header_line(const std::string& line) {
   if (text.starts_with("transfer-encoding:") && text.find("chunked") != std::string::npos) chunked_ = true;
   if (text.starts_with("content-encoding:") && text.find("gzip") != std::string::npos)
     refuse("the caster compresses its stream, which is not supported", 60);
+  // A login page, or a proxy's error: its text must not reach a receiver.
+  const bool page = text.starts_with("content-type:") && text.find("text/html") != std::string::npos;
+  if (page || text.starts_with('<')) return refuse(k_web_page, 30);
   if (text.starts_with("content-type:") && text.find("sourcetable") != std::string::npos) is_table_ = true;
 }
 
@@ -206,27 +224,65 @@ void Client::begin_stream(const device::Arrival& at) {
   if (options_.send_gga) send_position(at);
   std::string rest;
   rest.swap(held_);
-  if (!rest.empty()) stream(rest);
+  if (!rest.empty()) stream(rest, at);
 }
 
-void Client::stream(std::string_view bytes) {
-  if (chunked_) return unchunk(bytes);
-  out_.corrections(bytes);
+void Client::stream(std::string_view bytes, const device::Arrival& at) {
+  if (chunked_) return unchunk(bytes, at);
   const auto before = frames_.base();
-  if (frames_.feed(bytes) > 0) out_.heard();
+  const int good = frames_.feed(bytes);
+  hand_on(at);
+  if (good > 0) out_.heard();
   if (frames_.base() && frames_.base() != before) out_.base(*frames_.base());
+  judge_noise(bytes, good);
+}
+
+void Client::hand_on(const device::Arrival& at) {
+  const double passed_s = static_cast<double>(at.steady_ns - budget_at_ns_) * 1e-9;
+  budget_ = std::min(k_burst_bytes, budget_ + passed_s * k_rate_bytes_per_s);
+  budget_at_ns_ = at.steady_ns;
+  for (const auto& frame : frames_.whole()) {
+    if (static_cast<double>(frame.size()) > budget_) {
+      too_many_ = true;
+      out_.dropped("too_many_corrections");
+      continue;
+    }
+    budget_ -= static_cast<double>(frame.size());
+    handed_on_ += frame.size();
+    out_.corrections(frame);
+  }
+}
+
+void Client::judge_noise(std::string_view bytes, int good) {
   if (frames_.skipped() > skipped_) out_.dropped("no_rtcm_bytes", frames_.skipped() - skipped_);
   skipped_ = frames_.skipped();
+  since_frame_ = good > 0 ? 0 : since_frame_ + bytes.size();
+  if (good > 0) noise_.clear();
+  if (noise_.size() < 64) noise_ += bytes.substr(0, 64 - noise_.size());
+  if (since_frame_ > k_most_noise) {
+    const bool page =
+        noise_.find_first_not_of(" \t\r\n") == noise_.find('<') && noise_.find('<') != noise_.npos;
+    return refuse(
+        page ? k_web_page
+             : "the caster sends bytes that are no RTCM 3, which do not go to receivers: choose a mount "
+               "of RTCM 3",
+        30);
+  }
+  if (too_many_)
+    out_.notice(
+        "the caster sends more corrections than a receiver's link carries (32 KiB/s): the rest is dropped");
+  else if (skipped_ > k_worth_telling && skipped_ * 10 > handed_on_)
+    out_.notice("a part of what the caster sends is no RTCM 3 and does not go to receivers (no_rtcm_bytes)");
 }
 
-void Client::unchunk(std::string_view bytes) {
+void Client::unchunk(std::string_view bytes, const device::Arrival& at) {
   chunked_ = false;  // what is inside goes through stream()
   while (!bytes.empty() && state_ == State::stream) {
     if (chunk_left_ > 0) {
       const auto part = bytes.substr(0, chunk_left_);
       chunk_left_ -= part.size();
       bytes.remove_prefix(part.size());
-      stream(part);
+      stream(part, at);
       continue;
     }
     const char c = bytes.front();

@@ -17,9 +17,10 @@ struct ClientOptions {
   std::string host;                 ///< for the request's Host line
 };
 
-/// Corrections from an NTRIP caster, handed on to the rovers as they come. Undoes chunks, refuses what is not
-/// a stream (source table, refusals) with its reason, and tells the caster our rover's position every ten
-/// seconds. See device::Driver.
+/// Corrections from an NTRIP caster for the rovers: whole RTCM 3 frames, each as soon as its last byte came,
+/// and nothing else, since a receiver takes commands on the same wire. Undoes chunks, refuses what is not a
+/// stream (source table, web page, refusals, k_most_noise bytes without a frame) with its reason, and tells
+/// the caster our rover's position every ten seconds. See device::Driver.
 class Client final : public device::Driver {
  public:
   Client(ClientOptions options, device::DriverOutput& output);
@@ -39,8 +40,10 @@ class Client final : public device::Driver {
   void begin_stream(const device::Arrival& at);
   void table_line(const std::string& line);
   void table_end();
-  void stream(std::string_view bytes);
-  void unchunk(std::string_view bytes);
+  void stream(std::string_view bytes, const device::Arrival& at);
+  void hand_on(const device::Arrival& at);
+  void judge_noise(std::string_view bytes, int good);
+  void unchunk(std::string_view bytes, const device::Arrival& at);
   void refuse(const std::string& why, std::int64_t wait_s);
   void send_position(const device::Arrival& now);
 
@@ -51,8 +54,13 @@ class Client final : public device::Driver {
   bool chunked_{false}, is_table_{false};
   std::size_t chunk_left_{0};
   std::string mounts_;  ///< of a source table
-  RtcmCounter frames_;
-  std::uint64_t skipped_{0};
+  RtcmFrames frames_;
+  std::uint64_t skipped_{0}, handed_on_{0};  ///< bytes, of this connection
+  std::size_t since_frame_{0};               ///< bytes since the last good frame
+  std::string noise_;                        ///< its first ones, to say what they are
+  double budget_{0};                         ///< bytes that may go to receivers now
+  std::int64_t budget_at_ns_{0};
+  bool too_many_{false};
   std::optional<std::int64_t> deadline_ns_{};
 };
 

@@ -1,20 +1,32 @@
 #include "drivers/ntrip/rtcm.hpp"
 
+#include <array>
 #include <cmath>
 #include <cstddef>
 
 namespace anchord::ntrip {
 
+namespace {
+
+/// One byte at a time: a stream of false preambles asks for a thousand bytes of checksum each.
+constexpr std::array<std::uint32_t, 256> make_table() {
+  std::array<std::uint32_t, 256> out{};
+  for (std::uint32_t byte = 0; byte < out.size(); ++byte) {
+    std::uint32_t crc = byte << 16;
+    for (int i = 0; i < 8; ++i) crc = crc << 1 ^ ((crc & 0x800000) != 0 ? 0x1864cfbu : 0);
+    out[byte] = crc & 0xffffff;
+  }
+  return out;
+}
+constexpr auto k_table = make_table();
+
+}  // namespace
+
 std::uint32_t crc24q(std::string_view bytes) {
   std::uint32_t crc = 0;
-  for (const char c : bytes) {
-    crc ^= static_cast<std::uint32_t>(static_cast<unsigned char>(c)) << 16;
-    for (int i = 0; i < 8; ++i) {
-      crc <<= 1;
-      if (crc & 0x1000000) crc ^= 0x1864cfb;
-    }
-  }
-  return crc & 0xffffff;
+  for (const char c : bytes)
+    crc = (crc << 8 & 0xffffff) ^ k_table[(crc >> 16 ^ static_cast<unsigned char>(c)) & 0xff];
+  return crc;
 }
 
 namespace {
@@ -49,7 +61,8 @@ std::optional<BaseStation> base_station(std::string_view body) {
   return out;
 }
 
-int RtcmCounter::feed(std::string_view bytes) {
+int RtcmFrames::feed(std::string_view bytes) {
+  whole_.clear();
   held_ += bytes;
   int good = 0;
   std::size_t at = 0;
@@ -75,6 +88,7 @@ int RtcmCounter::feed(std::string_view bytes) {
     }
     if (length >= 2) newest_ = static_cast<int>(byte(at + 3) << 4 | byte(at + 4) >> 4);
     if (const auto told = base_station(frame.substr(3, length))) base_ = told;
+    whole_.emplace_back(frame);
     ++good;
     at += whole;
   }

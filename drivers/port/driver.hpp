@@ -70,6 +70,9 @@ class DriverOutput {
   virtual void heard() = 0;
   /// Bytes or rows not used. `reason` is of a small fixed set: it becomes a metric label.
   virtual void dropped(std::string_view reason, std::uint64_t n = 1) = 0;
+  /// One line about what this connection sends that a person should act on, though it talks; empty: nothing
+  /// any more. Without running numbers.
+  virtual void notice(std::string_view text) { (void)text; }
   /// Outcome of a command: a JSON value, or why not. Exactly once a command.
   virtual void answer(std::uint64_t command_id, Result<std::string> json) = 0;
   /// Corrections for rovers (RTCM), from an NTRIP client.

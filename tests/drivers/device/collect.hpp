@@ -37,6 +37,7 @@ struct Collect final : PipelineSink {
   void dropped(std::uint16_t, std::string_view reason, std::uint64_t n) override {
     drops[std::string(reason)] += n;
   }
+  void notice(std::uint16_t slot, std::string_view text) override { notices[slot] = std::string(text); }
   void answer(std::uint16_t, std::uint64_t id, const Result<std::string>& json) override {
     answers[id] = json ? json.value() : "error: " + json.error().message;
   }
@@ -54,6 +55,7 @@ struct Collect final : PipelineSink {
   std::map<std::uint16_t, Identity> identities;
   std::map<std::uint16_t, ClockReading> clocks;
   std::map<std::string, std::uint64_t> drops;
+  std::map<std::uint16_t, std::string> notices;
   std::map<std::uint64_t, std::string> answers;
   std::string rows;
   int heard_count{0};

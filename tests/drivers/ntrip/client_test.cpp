@@ -45,7 +45,7 @@ struct Link {
 
 TEST(Crc24q, OfTheStandardsExampleIsItsOwn) {
   EXPECT_EQ(crc24q(std::string_view(k_1005).substr(0, 22)), 0x360b98u);
-  RtcmCounter counter;
+  RtcmFrames counter;
   EXPECT_EQ(counter.feed(k_1005 + "\xd3\xd3junk" + k_1005), 2);
   EXPECT_EQ(counter.newest_message(), 1005);
   EXPECT_EQ(counter.skipped(), 6u);
@@ -123,6 +123,95 @@ TEST(NtripClient, UndoesChunksThatCutFrames) {
     ASSERT_EQ(link.to_rover(), k_1005) << "cut at " << cut;
     ASSERT_EQ(link.sink.hung_up, "the caster ended the stream");
   }
+}
+
+// CFG-RST (cold start) of UBX, the same of a MediaTek receiver, and bytes that look like nothing.
+TEST(NtripClient, NothingButWholeFramesWithARightSumReachesARover) {
+  const std::string ubx("\xb5\x62\x06\x04\x04\x00\xff\xff\x00\x00\x0c\x5d", 12);
+  std::string broken = k_1005;
+  broken[10] = static_cast<char>(broken[10] ^ 1);
+  for (const std::string& foreign : {ubx, std::string("$PMTK104*37\r\n"), std::string("<html>x</html>"),
+                                     broken, k_1005.substr(0, 12), std::string("\xd3\xd3\xd3")}) {
+    Link link;
+    link.take(EventKind::opened, 2);
+    link.take(EventKind::bytes, 2, "ICY 200 OK\r\n\r\n" + k_1005 + foreign);
+    EXPECT_EQ(link.to_rover(), k_1005) << foreign;
+    link.take(EventKind::bytes, 2, foreign + k_1005 + k_1005);
+    std::string later = link.to_rover();
+    // A false preamble may ask for more bytes before it shows itself false; then nothing is lost.
+    for (int i = 0; i < 50; ++i) {
+      link.take(EventKind::bytes, 2, k_1005);
+      later += link.to_rover();
+    }
+    EXPECT_EQ(later.size() % k_1005.size(), 0U);
+    EXPECT_GE(later.size(), 50 * k_1005.size());
+    for (std::size_t at = 0; at < later.size(); at += k_1005.size())
+      ASSERT_EQ(later.substr(at, k_1005.size()), k_1005) << foreign;
+    EXPECT_GE(link.sink.drops["no_rtcm_bytes"], foreign == k_1005.substr(0, 12) ? 12U : foreign.size());
+    EXPECT_EQ(link.sink.hung_up, "");
+  }
+}
+
+TEST(NtripClient, AFrameGoesToTheRoverWithItsLastByte) {
+  Link link;
+  link.take(EventKind::opened, 2);
+  link.take(EventKind::bytes, 2, "ICY 200 OK\r\n\r\n" + k_1005.substr(0, 24));
+  EXPECT_EQ(link.to_rover(), "");
+  link.take(EventKind::bytes, 2, k_1005.substr(24));
+  EXPECT_EQ(link.to_rover(), k_1005);
+}
+
+TEST(NtripClient, RefusesAWebPageByItsNameOrByItsText) {
+  const std::string why =
+      "the caster sends a web page (HTML): check address, port and mount, or sign in to this network's login "
+      "page";
+  const std::string page = "<html><body>Login</body></html>\n";
+  for (const std::string& head :
+       {std::string("HTTP/1.1 200 OK\r\nContent-Type: text/html; charset=utf-8\r\n\r\n"),
+        std::string("ICY 200 OK\r\n"), std::string("HTTP/1.0 200 OK\r\n")}) {
+    Link link;
+    link.take(EventKind::opened, 2);
+    link.take(EventKind::bytes, 2, head + page);
+    EXPECT_EQ(link.to_rover(), "");
+    EXPECT_EQ(link.sink.hung_up, why) << head;
+  }
+  Link without_a_type;
+  without_a_type.take(EventKind::opened, 2);
+  without_a_type.take(EventKind::bytes, 2, "HTTP/1.1 200 OK\r\n\r\n");
+  without_a_type.take(EventKind::bytes, 2, "\r\n" + page + std::string(70'000, 'x'));
+  EXPECT_EQ(without_a_type.sink.hung_up, why);
+}
+
+TEST(NtripClient, AStreamWithoutAFrameEndsAfter64KiBAndAMixedOneIsNamed) {
+  Link link;
+  link.take(EventKind::opened, 2);
+  link.take(EventKind::bytes, 2, "ICY 200 OK\r\n\r\n" + k_1005);
+  for (int i = 0; i < 64; ++i) link.take(EventKind::bytes, 2, std::string(1000, 'x'));
+  EXPECT_EQ(link.sink.hung_up, "");
+  EXPECT_EQ(link.sink.notices[2],
+            "a part of what the caster sends is no RTCM 3 and does not go to receivers (no_rtcm_bytes)");
+  for (int i = 0; i < 2; ++i) link.take(EventKind::bytes, 2, std::string(1000, 'x'));
+  EXPECT_EQ(
+      link.sink.hung_up,
+      "the caster sends bytes that are no RTCM 3, which do not go to receivers: choose a mount of RTCM 3");
+  EXPECT_EQ(link.to_rover(), k_1005);
+}
+
+TEST(NtripClient, AFloodOfGoodFramesIsHeldToWhatAReceiversLinkCarries) {
+  Link link;
+  link.take(EventKind::opened, 2);
+  link.take(EventKind::bytes, 2, "ICY 200 OK\r\n\r\n");
+  std::string many;
+  for (int i = 0; i < 400; ++i) many += k_1005;  // 10 kB
+  for (int i = 0; i < 100; ++i) {                // 1 MB in ten seconds
+    link.now_ns += 100'000'000;
+    link.take(EventKind::bytes, 2, many);
+  }
+  const auto passed = link.to_rover().size();
+  EXPECT_LE(passed, 11u * 32 * 1024 + 65'536);  // its burst, and ten seconds of the rate
+  EXPECT_GE(passed, 10u * 32 * 1024);
+  EXPECT_GT(link.sink.drops["too_many_corrections"], 20'000u);
+  EXPECT_NE(link.sink.notices[2].find("32 KiB/s"), std::string::npos);
 }
 
 TEST(NtripClient, SaysWhyThereIsNoStream) {
