@@ -93,7 +93,14 @@ void Assembler::publish(Epochs& out) {
   if (!group.any) return;
   std::optional<std::int64_t> days = group.zda ? group.zda->days : std::nullopt;
   if (!days && group.rmc) days = group.rmc->days;
-  if (days && group.tod_ns) set_reference({*days * k_day_ns + *group.tod_ns});
+  const auto told =
+      days && group.tod_ns ? std::optional(UtcTime{*days * k_day_ns + *group.tod_ns}) : std::nullopt;
+  // Without a fix a receiver has the date of its battery or of its first day: it is of this epoch alone,
+  // which has no position, and dates no other.
+  const Gga* said = group.position();
+  const bool sure = said != nullptr ? fix_of_quality(said->quality.value_or(0)) != FixClass::none
+                                    : !group.rmc || group.rmc->valid;
+  if (told && sure) set_reference(*told);
   if (!group.has_position()) {
     if (group.gst && kept_ && group.tod_ns) kept_ = KeptSigmas{*group.gst, *group.tod_ns, kept_->quality};
     return;
@@ -125,6 +132,7 @@ void Assembler::publish(Epochs& out) {
     epoch.lat_deg = epoch.lon_deg = epoch.height_msl_m = epoch.height_ellipsoid_m = std::nullopt;
   }
   apply_sigmas(group, epoch);
+  if (told && !sure) epoch.time = told;
   emit(std::move(epoch), group.tod_ns, out);
 }
 
@@ -132,6 +140,10 @@ void Assembler::emit(Epoch epoch, std::optional<std::int64_t> tod_ns, Epochs& ou
   constexpr std::size_t k_max_waiting = 600;  // a minute at 10 Hz
   epoch.protocol = Protocol::nmea;
   epoch.time_of_day_ns = tod_ns;
+  if (epoch.time) {
+    out.push_back(std::move(epoch));
+    return;
+  }
   waiting_.push_back(std::move(epoch));
   if (reference_ || waiting_.size() > k_max_waiting) flush(out);
 }

@@ -188,14 +188,23 @@ bool Rover::chosen(const Epoch& epoch, const Arrival& at) {
 }
 
 void Rover::give_one(const Epoch& epoch, const Arrival& at) {
+  if (epoch.fix == FixClass::none) {
+    // Its clock runs on a battery, or from the first second of 1980: no time of it counts, only that it is
+    // there.
+    auto status = status_of(epoch);
+    if (!epoch.time) status.time = out_.time().utc_of(at.steady_ns).time;
+    out_.rover(status);
+    return out_.dropped("no_fix");
+  }
   if (!epoch.time) return out_.dropped("no_time");
   if (newest_ && epoch.time->ns <= newest_->ns && newest_->ns - epoch.time->ns < k_jump_ns) {
     return out_.dropped(epoch.time == newest_ ? "repeated_epoch" : "out_of_order");
   }
   newest_ = epoch.time;
-  out_.time().receiver_said(out_.slot(), *epoch.time, at, options_.latency_s);
+  const auto belief = out_.time().receiver_said(out_.slot(), *epoch.time, at, options_.latency_s);
+  out_.notice(out_.time().doubt(out_.slot()).value_or(""));
   out_.rover(status_of(epoch));
-  if (epoch.fix == FixClass::none) return out_.dropped("no_fix");
+  if (belief != timing::Belief::believed) return out_.dropped("date_not_believed");
   auto fix = to_fix(epoch, MissionId{});
   if (!fix) return out_.dropped("no_ellipsoidal_height");
   if (!plausible(*fix)) return out_.dropped("implausible_position");

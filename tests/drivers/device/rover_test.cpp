@@ -142,6 +142,51 @@ TEST(Rover, TeachesTheTimeBaseUtc) {
               1e5);
 }
 
+// A MediaTek receiver before its first fix has counted from 1980: that became the time of all the server had.
+TEST(Rover, WithoutAFixItSaysNoTimeWhateverItsClockShows) {
+  for (const char* date : {"060180", "160624"}) {
+    OneRover rover;
+    for (int i = 0; i < 30; ++i) {
+      char text[160];
+      std::snprintf(text, sizeof text, "GPRMC,0000%02d.00,V,,,,,0.00,0.00,%s,,,N", i + 2, date);
+      const auto cold = test::sentence(text);
+      std::snprintf(text, sizeof text, "GPGGA,0000%02d.00,,,,,0,00,,,M,,M,,", i + 2);
+      rover.take(EventKind::bytes, i * k_s + 80 * k_ms, test::sentence(text) + cold);
+      rover.settle();
+    }
+    EXPECT_EQ(rover.pipeline.time().source(), timing::TimeSource::system_clock);
+    EXPECT_EQ(rover.sink.drops["no_fix"], 30U);
+    // Its first fix, a second before the date is right.
+    rover.take(EventKind::bytes, 40 * k_s, gga(40));
+    rover.settle();
+    rover.take(EventKind::bytes, 41 * k_s, gga(41) + rmc(41));
+    rover.settle();
+    ASSERT_EQ(rover.sink.fixes.size(), 2U);
+    EXPECT_EQ(rover.sink.fixes[0].time.ns, k_epoch + 40 * k_s);
+    EXPECT_EQ(rover.sink.fixes[1].time.ns, k_epoch + 41 * k_s);
+  }
+}
+
+TEST(Rover, WithAWeekRolloverItsPositionsAreNotUsedAndItSaysWhy) {
+  OneRover rover;
+  for (int i = 0; i < 20; ++i) {
+    auto text = rmc(i);
+    text.replace(text.find("160624"), 6, "311004");  // 1024 weeks before
+    text = test::sentence(std::string(text.substr(1, text.find('*') - 1)));
+    rover.take(EventKind::bytes, i * k_s + 80 * k_ms, text + gga(i));
+    rover.settle();
+  }
+  EXPECT_TRUE(rover.sink.fixes.empty());
+  EXPECT_EQ(rover.sink.drops["date_not_believed"], 20U);
+  EXPECT_EQ(rover.pipeline.time().source(), timing::TimeSource::system_clock);
+  EXPECT_NE(rover.sink.notices[1].find("2004-10-31, 1024 weeks early (GPS week rollover)"), std::string::npos)
+      << rover.sink.notices[1];
+  rover.take(EventKind::bytes, 30 * k_s, rmc(30) + gga(30));
+  rover.settle();
+  EXPECT_EQ(rover.sink.fixes.size(), 1U);
+  EXPECT_EQ(rover.sink.notices[1], "");
+}
+
 TEST(Rover, RefusesOptionsItDoesNotKnow) {
   Collect sink;
   device::Pipeline pipeline(sink);
