@@ -58,7 +58,8 @@ TEST_P(AccessContract, KeepsBrowserSessionsUntilTheyEnd) {
       after{std::string(64, 'd'), token.id, UtcTime{990}};
   const auto cookies = [&] {
     std::vector<std::string> all;
-    for (const auto& one : tokens.sessions().value()) all.push_back(one.cookie_sha256_hex.substr(0, 1));
+    const auto kept = tokens.sessions().value();
+    for (const auto& one : kept) all.push_back(one.cookie_sha256_hex.substr(0, 1));
     return all;
   };
   for (const auto& one : {late, early}) ASSERT_TRUE(tokens.keep_session(one, UtcTime{100}));
