@@ -30,7 +30,7 @@ struct DeviceConfig {
 struct DeviceReport {
   DeviceConfig config;
   std::string state{"off"};  ///< off, lost, found, open, talking, silent
-  std::string reason;        ///< why it is not talking, one line
+  std::string reason;        ///< why it is not talking, or what is wrong with what it says, one line
   std::string conflict;      ///< two devices on one port, or one identity on two
   double in_state_s{};
   std::optional<UtcTime> last_seen{};

@@ -53,6 +53,10 @@ class Rate {
 
 /// For a device whose bytes make no frame.
 std::string unreadable(const Settings& settings, const link::Address& address) {
+  if (settings.kind == "ntrip")
+    return "bytes are received, but they make no frame of RTCM 3, and nothing else goes to receivers: choose "
+           "a "
+           "mount of RTCM 3";
   std::string out = "bytes are received, but they make no frame: is it a " + settings.kind + " device";
   if (settings.kind == "gnss") out += " that sends the format that is set (auto accepts any)";
   if (address.kind == link::Kind::serial)
@@ -78,6 +82,9 @@ struct Entry {
   Rate rate;
   std::int64_t hang_up_wait_ns{0};
   std::string hang_up;
+  std::string notice;  ///< of this link's driver
+  Noise noise{};
+  SentIds ids{};
 };
 
 }  // namespace
@@ -183,7 +190,11 @@ class DeviceLoop::Impl final : public PipelineSink, public std::enable_shared_fr
     out.from_receiver = time.source() == timing::TimeSource::receiver;
     out.system_offset_s = time.system_offset_s();
     out.sigma_s = time.utc_of(now()).sigma_s;
-    out.skew = time.skew().value_or("");
+    out.skew = time.skew([&](int slot) {
+                     const auto found = entries_.find(static_cast<std::uint16_t>(slot));
+                     return found == entries_.end() ? std::string("?") : found->second.settings.name;
+                   })
+                   .value_or("");
     for (const auto& [slot, entry] : entries_) {
       // No running numbers: this becomes an alarm, and a new text would ask for attention anew.
       if (out.skew.empty() && entry.told.clock && entry.told.clock->skewed)
@@ -218,6 +229,7 @@ class DeviceLoop::Impl final : public PipelineSink, public std::enable_shared_fr
     const auto found = entries_.find(slot);
     if (found == entries_.end()) return;
     ++found->second.told.ranges;
+    found->second.ids.note(range);
     found->second.rate.count(now());
     if (range.mission == MissionId{}) return;
     listener_.range(found->second.settings.id, range);
@@ -242,12 +254,19 @@ class DeviceLoop::Impl final : public PipelineSink, public std::enable_shared_fr
     const auto found = entries_.find(slot);
     if (found == entries_.end()) return;
     ++found->second.told.frames;
+    found->second.noise.heard();
     found->second.told.last_seen = now_.utc;
     if (const auto& link = found->second.link) found->second.bytes_understood = link->counters().bytes_in;
     happen(slot, {Happened::heard, now()});
   }
   void dropped(std::uint16_t slot, std::string_view reason, std::uint64_t n) override {
     count(slot, reason, n);
+  }
+  void notice(std::uint16_t slot, std::string_view text) override {
+    const auto found = entries_.find(slot);
+    if (found == entries_.end() || found->second.notice == text) return;
+    found->second.notice = text;
+    listener_.changed(found->second.settings.id);
   }
   void answer(std::uint16_t slot, std::uint64_t id, const Result<std::string>& json) override {
     if (const auto found = entries_.find(slot); found != entries_.end()) {
@@ -284,6 +303,9 @@ class DeviceLoop::Impl final : public PipelineSink, public std::enable_shared_fr
     out.settings = entry.settings;
     out.phase = entry.supervision.phase;
     out.reason = entry.supervision.reason;
+    out.too_many_ids = entry.ids.trouble();
+    if (out.phase == Phase::talking && out.reason.empty())
+      out.reason = entry.notice.empty() ? out.too_many_ids : entry.notice;
     const auto at = now();
     out.in_phase_s = static_cast<double>(at - entry.supervision.since_ns) * 1e-9;
     out.rows_per_s = entry.rate.value(at);
@@ -291,7 +313,8 @@ class DeviceLoop::Impl final : public PipelineSink, public std::enable_shared_fr
       out.bytes_in += entry.link->counters().bytes_in;
       out.bytes_out += entry.link->counters().bytes_out;
       if (out.phase == Phase::silent && entry.link->counters().bytes_in > entry.bytes_understood)
-        out.reason = unreadable(entry.settings, entry.address);
+        out.reason = unreadable(entry.settings, entry.address) +
+                     (entry.noise.skipped() ? " Only a sample of them is recorded." : "");
     }
     return out;
   }
@@ -307,8 +330,27 @@ class DeviceLoop::Impl final : public PipelineSink, public std::enable_shared_fr
 
   Result<void> take(const record::Event& event) {
     now_ = event.at;
-    if (recorder_ != nullptr) recorder_->take(event);
-    return pipeline_.take(event);
+    if (recorder_ == nullptr) return pipeline_.take(event);
+    const auto found = entries_.find(event.slot);
+    const bool bytes = event.kind == EventKind::bytes && found != entries_.end();
+    const bool flight = pipeline_.mission() != MissionId{};
+    if (!bytes || found->second.noise.is_worth_recording(event.payload.size(), event.at.steady_ns, flight,
+                                                         options_.noise)) {
+      if (bytes) found->second.told.recorded += event.payload.size();
+      recorder_->take(event);
+      return pipeline_.take(event);
+    }
+    // Noise so far: recorded only when a frame ends in it.
+    auto& told = found->second.told;
+    const auto before = told.frames;
+    auto done = pipeline_.take(event);
+    if (told.frames == before) {
+      count(event.slot, "noise_not_recorded_bytes", event.payload.size());
+      return done;
+    }
+    told.recorded += event.payload.size();
+    recorder_->take(event);
+    return done;
   }
 
   /// The third door of exceptions: what a driver throws ends its link, not the flight.
@@ -348,6 +390,7 @@ class DeviceLoop::Impl final : public PipelineSink, public std::enable_shared_fr
     entry.device_number = 0;
     entry.told.clock.reset();
     entry.told.base.reset();
+    entry.notice.clear();
     if (std::exchange(entry.fed, false)) {
       ++entry.told.lost;
       const auto ran = guarded(task_of(slot), [&] {

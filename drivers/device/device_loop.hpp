@@ -10,6 +10,7 @@
 
 #include "core/base/ids.hpp"
 #include "core/base/result.hpp"
+#include "drivers/device/bounds.hpp"
 #include "drivers/device/supervisor.hpp"
 #include "drivers/port/driver.hpp"
 
@@ -26,8 +27,9 @@ namespace anchord::device {
 struct DeviceState {
   Settings settings;
   Phase phase{Phase::lost};
-  std::string reason;    ///< why it is not talking
-  std::string conflict;  ///< two devices on one port, or one identity on two devices; empty: none
+  std::string reason;        ///< why it is not talking; while it talks, what is wrong with what it says
+  std::string too_many_ids;  ///< what is wrong with the ids it sends, and what to do; empty: nothing
+  std::string conflict;      ///< two devices on one port, or one identity on two devices; empty: none
   double in_phase_s{0};
   std::optional<UtcTime> last_seen{};
   Identity identity;
@@ -37,6 +39,7 @@ struct DeviceState {
   std::uint64_t bytes_in{0}, bytes_out{0}, frames{0}, fixes{0}, ranges{0}, opened{0}, lost{0};
   std::map<std::string, std::uint64_t> dropped;  ///< by reason
   double rows_per_s{0};                          ///< over the last five seconds
+  std::uint64_t recorded{0};                     ///< bytes of it that went to the recording
 };
 
 /// How the server's clocks stand.
@@ -58,6 +61,7 @@ class DeviceListener {
 };
 
 struct LoopOptions {
+  NoiseLimits noise{};
   SupervisorOptions supervisor{};
   std::int64_t presence_poll_ms = 500;  ///< of serial ports that are gone: by-id names come with the plug
   std::uint64_t seed = 1;               ///< of the jitter

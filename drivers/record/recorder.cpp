@@ -5,11 +5,13 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <cerrno>
 #include <condition_variable>
 #include <cstdio>
 #include <cstring>
+#include <fstream>
 #include <map>
 #include <utility>
 #include <vector>
@@ -91,8 +93,9 @@ struct Recorder::State {
   Locked<Parts> parts;
   std::condition_variable wake;
   std::atomic<std::uint64_t> written{0}, lost{0};
-  std::atomic<bool> scarce{false};      ///< the disk has less than keep_free_bytes
-  std::atomic<bool> taken_away{false};  ///< the part that is written: what follows goes to the next one
+  std::atomic<bool> scarce{false};       ///< the disk has less than keep_free_bytes
+  std::atomic<bool> taken_away{false};   ///< the part that is written: what follows goes to the next one
+  std::map<fs::path, bool> of_a_flight;  ///< of the syncing thread: finished parts it has read
   Thread syncer;
 
   Result<void> next_part(const link::Arrival& at);
@@ -100,6 +103,7 @@ struct Recorder::State {
   bool write(std::string_view bytes);
   void fail(std::int64_t now_ns, const std::string& why);
   int sync(const ToSync& what) const;
+  void make_room(const fs::path& in_use);
   void sync_loop();
 };
 
@@ -183,6 +187,25 @@ int Recorder::State::sync(const ToSync& what) const {
   return failed;
 }
 
+/// The oldest first, as many as make_room_bytes want; never the part that is written, nor one of a flight.
+void Recorder::State::make_room(const fs::path& in_use) {
+  std::error_code error;
+  std::vector<fs::path> old;
+  for (fs::directory_iterator it(folder, error), end; !error && it != end; it.increment(error))
+    if (it->path().extension() == ".anrec" && it->path().filename() < in_use.filename())
+      old.push_back(it->path());
+  std::sort(old.begin(), old.end());
+  for (const auto& file : old) {
+    const auto known = of_a_flight.find(file);
+    if (known == of_a_flight.end() ? (of_a_flight[file] = may_hold_a_flight(file)) : known->second) continue;
+    if (!fs::remove(file, error)) continue;
+    of_a_flight.erase(file);
+    if (options.removed) options.removed(file);
+    const auto space = fs::space(folder, error);
+    if (error || space.available >= options.make_room_bytes) return;
+  }
+}
+
 void Recorder::State::sync_loop() {
   const auto every = std::chrono::milliseconds(options.sync_every_ms);
   for (std::uint64_t synced = 0;;) {
@@ -206,7 +229,11 @@ void Recorder::State::sync_loop() {
     const int failed = sync(due);
     const bool holds = place.holds();
     std::error_code unknown;
-    const auto space = fs::space(folder, unknown);
+    auto space = fs::space(folder, unknown);
+    if (!unknown && space.available < options.make_room_bytes) {
+      (void)guarded("room for recordings", [&] { make_room(file); });
+      space = fs::space(folder, unknown);
+    }
     scarce = !unknown && space.available < options.keep_free_bytes;
     if (due.fds.empty() && failed == 0 && holds) continue;
     auto now = parts.lock();
@@ -274,7 +301,8 @@ void Recorder::take(const Event& event) {
       return s.fail(event.at.steady_ns, std::strerror(errno));
     }
     s.retry_at_ns = 0;
-    const bool told = event.kind == EventKind::added || event.kind == EventKind::mission;
+    const bool told =
+        event.kind == EventKind::added || (event.kind == EventKind::mission && !event.payload.empty());
     if (told) return;  // the head of the new part says it
   }
   s.scratch.clear();
@@ -294,6 +322,22 @@ std::uint64_t Recorder::events_lost() const { return state_->lost; }
 fs::path Recorder::file() const {
   const auto parts = state_->parts.lock();
   return parts->file;
+}
+
+bool may_hold_a_flight(const fs::path& part) {
+  std::ifstream in(part, std::ios::binary);
+  std::string magic(k_magic.size(), '\0');
+  if (!in.read(magic.data(), static_cast<std::streamsize>(magic.size())) || magic != k_magic) return true;
+  std::array<unsigned char, k_record_head + 1> head{};
+  while (in.read(reinterpret_cast<char*>(head.data()), head.size())) {
+    std::uint32_t length = 0;
+    for (std::size_t i = 4; i-- > 0;) length = length << 8 | head[i];
+    if (length < k_body_head || length > k_body_head + k_max_payload) return true;
+    const bool names_a_mission = length > k_body_head;
+    if (head[k_record_head] == static_cast<unsigned char>(EventKind::mission) && names_a_mission) return true;
+    in.ignore(length - 1);
+  }
+  return false;
 }
 
 Result<std::vector<fs::path>> parts_of(const fs::path& file) {

@@ -277,6 +277,82 @@ TEST(DeviceLoop, GarbageIsOpenButNotTalkingAndIsCounted) {
   EXPECT_NE(loop.device("r")->reason.find("115200 baud"), std::string::npos) << loop.device("r")->reason;
 }
 
+/// Bytes of the kind in a recording, one after the other.
+std::string recorded_bytes(const fs::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  const std::string text(std::istreambuf_iterator<char>(in), {});
+  record::EventReader reader(text);
+  EXPECT_TRUE(reader.begin());
+  std::string out;
+  while (const auto event = reader.next())
+    if (event->kind == record::EventKind::bytes) out += event->payload;
+  return out;
+}
+
+// A receiver at the wrong baud rate, or no receiver: 10 MB/s of it filled the disk until no flight could
+// start.
+TEST(DeviceLoop, OfNoiseASampleIsRecordedAndEverythingFromTheNextFrameOn) {
+  for (const bool flight : {false, true}) {
+    const auto folder = temporary("loop_noise");
+    fs::path recording;
+    {
+      boost::asio::io_context io;
+      Listener listener;
+      const auto recorder = record::Recorder::open(folder, SystemClock{}.now()).value();
+      recording = recorder->file();
+      auto options = quick();
+      options.supervisor.silent_after_ns = 10'000'000;
+      options.noise = {.in_a_flight_bytes = 6000, .else_bytes = 2000, .sample_bytes = 1000};
+      DeviceLoop loop(io, recorder.get(), listener, options);
+      ASSERT_TRUE(loop.add(gnss("r", "tcp-listen://:0")));
+      if (flight) loop.record_into(k_mission);
+      ASSERT_TRUE(run_until(io, [&] { return loop.port("r") != 0; }));
+      link::test::Seen device(link::make_link(
+          io, link::parse_address("tcp://127.0.0.1:" + std::to_string(loop.port("r"))).value()));
+      ASSERT_TRUE(run_until(io, [&] { return device.opens == 1; }));
+      const auto say = [&](const std::string& text) {
+        const auto before = loop.device("r")->bytes_in;
+        ASSERT_TRUE(device.link->write(text));
+        ASSERT_TRUE(run_until(io, [&] { return loop.device("r")->bytes_in == before + text.size(); }));
+      };
+      for (int i = 0; i < 100; ++i) say(std::string(500, '\x7f'));
+      ASSERT_TRUE(run_until(io, [&] { return loop.device("r")->phase == Phase::silent; }));
+      EXPECT_NE(loop.device("r")->reason.find("Only a sample of them is recorded."), std::string::npos)
+          << loop.device("r")->reason;
+      EXPECT_GT(loop.device("r")->dropped["noise_not_recorded_bytes"], 40'000U);
+      say(epoch(1));
+      say(epoch(2));
+      ASSERT_TRUE(run_until(io, [&] { return loop.device("r")->phase == Phase::talking; }));
+      say(epoch(3));
+    }
+    const auto kept = recorded_bytes(recording);
+    const auto noise = kept.size() - (epoch(1) + epoch(2) + epoch(3)).size();
+    EXPECT_EQ(noise, flight ? 7000U : 3000U)
+        << "what may be there at first, and the sample of the first minute";
+    EXPECT_TRUE(kept.ends_with(epoch(1) + epoch(2) + epoch(3)));
+    fs::remove_all(folder);
+  }
+}
+
+TEST(DeviceIds, ADeviceThatInventsThemIsToldAboutAndTakesNoMemory) {
+  SentIds ids;
+  Range range;
+  for (std::uint16_t i = 0; i < 60; ++i) {
+    range.tag = NetworkId{static_cast<std::uint16_t>(1 + i % 3)};
+    range.anchor = NetworkId{static_cast<std::uint16_t>(1000 + i)};
+    ids.note(range);
+  }
+  EXPECT_EQ(ids.trouble(), "") << "a large site";
+  for (std::uint16_t i = 0; i < 5000; ++i) {
+    range.tag = NetworkId{static_cast<std::uint16_t>(1 + i)};
+    ids.note(range);
+  }
+  EXPECT_EQ(
+      ids.trouble(),
+      "it sends more than 64 tag ids: a flight follows only those heard first, all rows are stored; are tag "
+      "and anchor of its mapping right?");
+}
+
 TEST(DeviceLoop, AnswersCommandsAndSaysWhenNothingIsConnected) {
   boost::asio::io_context io;
   Listener listener;

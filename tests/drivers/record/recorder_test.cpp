@@ -14,6 +14,7 @@
 #include <fstream>
 #include <iterator>
 #include <map>
+#include <set>
 
 #include "core/base/locked.hpp"
 
@@ -176,6 +177,87 @@ TEST(Recorder, LeavesTheLastOfTheDiskToTheRows) {
     recorder->take({EventKind::bytes, 3, {UtcTime{n}, n}, "a chunk of bytes"});
   EXPECT_NE(recorder->failed().find("MiB free on the disk, kept for measurements"), std::string::npos);
   EXPECT_GT(recorder->events_lost(), 0U);
+}
+
+std::set<std::string> names_in(const fs::path& folder) {
+  std::set<std::string> out;
+  for (const auto& entry : fs::directory_iterator(folder)) out.insert(entry.path().filename().string());
+  return out;
+}
+
+// Bytes of a device that never made sense filled the disk until no flight could start.
+TEST(Recorder, OldPartsWithoutAFlightMakeRoomAndThoseOfFlightsStay) {
+  const Folder folder;
+  const auto record = [&](std::int64_t at_s, const std::vector<std::string>& missions) {
+    const auto recorder =
+        Recorder::open(folder.path, UtcTime{k_start.ns + at_s * 1'000'000'000}, {.make_room_bytes = 0})
+            .value();
+    recorder->take({EventKind::added, 3, {}, R"({"id":"a"})"});
+    for (int i = 0; i < 20; ++i)
+      recorder->take({EventKind::bytes, 3, {UtcTime{i}, i}, std::string(5000, 'x')});
+    for (const auto& mission : missions) recorder->take({EventKind::mission, 0, {}, mission});
+    return recorder->file();
+  };
+  const std::string mission = "0190f1f2-0000-7000-8000-000000000001";
+  const auto idle = record(0, {}), flown = record(10, {mission, ""}), ended = record(20, {""}),
+             torn = record(30, {}), spoilt = record(40, {});
+  fs::resize_file(torn, fs::file_size(torn) - 7);
+  {
+    std::fstream file(spoilt, std::ios::binary | std::ios::in | std::ios::out);
+    file.seekp(static_cast<std::streamoff>(k_magic.size()));
+    file.write("\xff\xff\xff\x7f", 4);
+  }
+  EXPECT_FALSE(may_hold_a_flight(idle));
+  EXPECT_TRUE(may_hold_a_flight(flown));
+  EXPECT_FALSE(may_hold_a_flight(ended));
+  EXPECT_FALSE(may_hold_a_flight(torn));
+  EXPECT_TRUE(may_hold_a_flight(spoilt)) << "what cannot be read may be a flight";
+
+  RecorderOptions options;
+  options.sync_every_ms = 1;
+  options.keep_free_bytes = 0;
+  options.make_room_bytes = std::uint64_t{1} << 60;  // this disk never has it
+  Locked<std::vector<std::string>> removed;
+  options.removed = [&](const fs::path& part) {
+    auto all = removed.lock();
+    all->push_back(part.filename().string());
+  };
+  fs::path own;
+  {
+    const auto recorder = Recorder::open(folder.path, UtcTime{k_start.ns + 50'000'000'000}, options).value();
+    own = recorder->file();
+    const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(20);
+    while (removed.copy().size() < 3 && std::chrono::steady_clock::now() < end) ::usleep(1000);
+    recorder->take({EventKind::bytes, 3, {}, "still recorded"});
+    EXPECT_EQ(recorder->failed(), "");
+  }
+  EXPECT_EQ(removed.copy(), (std::vector<std::string>{idle.filename().string(), ended.filename().string(),
+                                                      torn.filename().string()}))
+      << "the oldest first";
+  EXPECT_EQ(names_in(folder.path),
+            (std::set<std::string>{flown.filename().string(), spoilt.filename().string(),
+                                   own.filename().string()}));
+}
+
+TEST(Recorder, TheEndOfAMissionIsSaidThoughANewPartBeginsWithIt) {
+  const Folder folder;
+  fs::path first;
+  {
+    const auto recorder = Recorder::open(folder.path, k_start, {.rotate_bytes = 1000}).value();
+    first = recorder->file();
+    recorder->take({EventKind::mission, 0, {}, "0190f1f2-0000-7000-8000-000000000001"});
+    recorder->take({EventKind::bytes, 3, {}, std::string(2000, 'x')});
+    recorder->take({EventKind::mission, 0, {}, ""});
+  }
+  const auto parts = parts_of(first).value();
+  ASSERT_EQ(parts.size(), 2U);
+  const auto text = slurp(parts[1]);
+  EventReader reader(text);
+  ASSERT_TRUE(reader.begin());
+  const auto said = reader.next();
+  ASSERT_TRUE(said);
+  EXPECT_EQ(said->kind, EventKind::mission);
+  EXPECT_EQ(said->payload, "");
 }
 
 TEST(Recorder, TurnsToANewPartThatTellsTheDevicesAgain) {
