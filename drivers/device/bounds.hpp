@@ -10,10 +10,12 @@
 namespace anchord::device {
 
 /// Bytes of a device that make no frame are recorded up to so many, and then a sample of them: noise must not
-/// fill the disk of the flights. The bytes that make a frame again are recorded, and all after them.
+/// fill the disk of the flights. In a flight so many are hours of any serial port: a receiver whose format is
+/// set wrong is decoded from them afterwards. The bytes that make a frame again are recorded, and all after
+/// them.
 struct NoiseLimits {
-  std::uint64_t in_a_flight_bytes = 16u << 20, else_bytes = 1u << 20;  ///< since the last frame
-  std::uint64_t sample_bytes = 64u << 10;                              ///< each minute
+  std::uint64_t in_a_flight_bytes = 256u << 20, else_bytes = 1u << 20;  ///< since the last frame
+  std::uint64_t sample_bytes = 64u << 10;                               ///< each minute
 };
 
 /// What of a device's noise is recorded. A new connection of it is no reason to begin again.
