@@ -5,6 +5,7 @@
 
 #include "core/geo/enu.hpp"
 #include "core/localize/flight_solver.hpp"
+#include "core/types/live_limits.hpp"
 
 namespace anchord::flight {
 namespace {
@@ -41,12 +42,22 @@ void LiveMission::add(const PredictedRange& judged) {
   if (range_times_us_.size() > k_rate_rows) range_times_us_.pop_front();
   const double span_s = static_cast<double>(range_times_us_.back() - range_times_us_.front()) * 1e-6;
   state_.range_rate_hz = span_s > 0 ? static_cast<double>(range_times_us_.size() - 1) / span_s : 0;
+  if (!follows(range)) return;
   watch_.note_range(range.time);
   if (excluded(setup_.exclusions, range)) return live_.leave_out(range);
   if (judged.model) watch_.note_model(judged.model->withheld);
   history_.add(corrected(judged), error_model_of(judged));
   ++ranges_since_joint_;
   live_.add(range, judged.model);
+}
+
+bool LiveMission::follows(const Range& range) {
+  const auto has_place = [](std::set<NetworkId>& known, NetworkId id, std::size_t most) {
+    return known.contains(id) || (known.size() < most && known.insert(id).second);
+  };
+  const bool tag = range.kind == RangeKind::tag_anchor;
+  return has_place(tag ? tags_ : anchors_, range.tag, tag ? k_most_live_tags : k_most_live_anchors) &&
+         has_place(anchors_, range.anchor, k_most_live_anchors);
 }
 
 void LiveMission::add(const Fix& fix) {
@@ -147,6 +158,8 @@ void LiveMission::begin_anew(std::vector<Exclusion> exclusions) {
   setup_.exclusions = std::move(exclusions);
   live_ = LiveFlight(setup_.mission, setup_.live);
   history_.clear();
+  tags_.clear();
+  anchors_.clear();
   rejections_published_.clear();
   priors_in_use_ = false;
   ranges_since_joint_ = 0;

@@ -6,6 +6,7 @@
 #include <deque>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -59,7 +60,8 @@ class LiveMission {
  public:
   explicit LiveMission(LiveMissionSetup setup);
 
-  /// One row, judged by the models when it came.
+  /// One row, judged by the models when it came. Ranges of tags and anchors beyond k_most_live_tags and
+  /// k_most_live_anchors are counted and nothing else.
   void add(const LiveRow& row);
   /// What turns and height searches found, from the next solve on; waits for the first good fix.
   void use_priors(procedure::FlightPriors priors);
@@ -105,6 +107,7 @@ class LiveMission {
  private:
   void add(const PredictedRange& judged);
   void add(const Fix& fix);
+  bool follows(const Range& range);
   void announce_fixes();
   void announce_estimate(Estimate estimate);
   void update_live_priors();
@@ -119,6 +122,7 @@ class LiveMission {
   bool reading_{false}, priors_in_use_{false};
   std::map<std::string, std::size_t> rejections_published_;
   std::map<NetworkId, std::string_view> statuses_;
+  std::set<NetworkId> tags_, anchors_;  ///< that are followed
   std::deque<std::int64_t> range_times_us_;
   std::size_t ranges_since_joint_{0};
   std::vector<Event> events_;

@@ -334,16 +334,24 @@ void add_delay_doubts(Work& work) {
        "their ranges want a delay of their own: antenna delay, cable, firmware or a wall before one anchor");
 }
 
+/// Between the questions: each of them looks at all anchors.
+Result<void> go_on(const FlightOptions& options) {
+  if (options.canceled && options.canceled()) return make_error(Errc::canceled, "canceled");
+  return boost::outcome_v2::success();
+}
+
 /// What is asked of a flight as a whole, after all of them are solved.
 Result<void> check_flight(const FlightData& flight, std::vector<Work>& all, std::size_t i,
                           const FlightOptions& options) {
   Work& work = all[i];
   BOOST_OUTCOME_TRY(const auto arm, check_lever_arm(work.rows, work.fit, work.prior, work.options));
   if (arm) work.checks.push_back(*arm);
+  BOOST_OUTCOME_TRYV(go_on(options));
   if (const auto clock = check_clock(work.rows, work.fit)) work.checks.push_back(*clock);
   add_arm_doubt(work.rows, work.prior, work.options, work.fit);
   work.unseen_arm = unseen_arm_gates(work.rows, work.fit, work.prior, work.options);
   BOOST_OUTCOME_TRY(ask_errors(work));
+  BOOST_OUTCOME_TRYV(go_on(options));
   ask_shift(flight, work);
   if (work.rows.step_share > 0) work.checks.push_back(check_steps(work.rows.step_share, options));
   const auto others = others_of(all, i, options);
@@ -432,7 +440,10 @@ Result<std::vector<FlightSolution>> solve_flights(std::span<const FlightData* co
   if (!options.fixed_bias_m) {
     for (Work& work : all) add_doubt(work.fit, work.gate);
   }
-  for (Work& work : all) add_delay_doubts(work);
+  for (Work& work : all) {
+    BOOST_OUTCOME_TRYV(go_on(options));
+    add_delay_doubts(work);
+  }
   for (std::size_t i = 0; i < all.size(); ++i) {
     BOOST_OUTCOME_TRY(check_flight(*flights[i], all, i, options));
   }
@@ -441,6 +452,7 @@ Result<std::vector<FlightSolution>> solve_flights(std::span<const FlightData* co
     profile->factors = all.empty() ? std::vector<ProfileFactor>{} : others_of(all, 0, options);
     if (!all.empty()) profile->factors.push_back(all.front().factor);
   }
+  BOOST_OUTCOME_TRYV(go_on(options));
   std::vector<FlightSolution> solutions;
   for (std::size_t i = 0; i < all.size(); ++i) solutions.push_back(describe(all[i], *flights[i]));
   return solutions;

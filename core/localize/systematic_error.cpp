@@ -381,6 +381,8 @@ Result<std::vector<ErrorAnswer>> answers_of(const ErrorTest::Given& given) {
   };
   std::vector<Odd> odd;
   for (const ErrorQuestion& question : error_questions(given.flight, given.fit)) {
+    // There are as many as anchors and antennas, and each looks at all of them.
+    if (given.options.canceled && given.options.canceled()) return make_error(Errc::canceled, "canceled");
     const ErrorAnswer& answer = answers.emplace_back(fitted.ask(question));
     const ErrorFinding wider = wide.find(question);
     const ErrorFinding& odder = std::abs(wider.z) > std::abs(answer.found.z) ? wider : answer.found;

@@ -11,6 +11,7 @@
 #include <set>
 
 #include "core/localize/flight_solver.hpp"
+#include "core/types/live_limits.hpp"
 #include "tests/core/localize/flight_support.hpp"
 
 namespace anchord::live_mission_test {
@@ -148,6 +149,35 @@ std::size_t n_held_back(const std::vector<Event>& events, const std::string& gat
     held.insert(told->estimate.anchor);
   }
   return held.size();
+}
+
+// One device that invented ids had 2.6 GB of solvers after 18 s.
+TEST(LiveMission, OfADeviceThatInventsIdsTheFirstAreFollowedAndAllRowsCounted) {
+  const FlightData data = make_flight(turning());
+  LiveMission mission(setup_of(data));
+  std::size_t n = 0;
+  for (const auto& row : stream(data)) {
+    mission.add(row);
+    const auto* judged = std::get_if<flight::PredictedRange>(&row);
+    if (judged == nullptr) continue;
+    auto invented = *judged;
+    invented.range.anchor = NetworkId{static_cast<std::uint16_t>(2000 + n % 5000)};
+    mission.add(flight::LiveRow(invented));
+    invented = *judged;
+    invented.range.tag = NetworkId{static_cast<std::uint16_t>(9000 + n % 3000)};
+    mission.add(flight::LiveRow(invented));
+    ++n;
+  }
+  mission.finish();
+  mission.settle();
+  EXPECT_EQ(mission.state().n_ranges, 3 * n);
+  EXPECT_LE(mission.estimates().size(), k_most_live_anchors);
+  std::set<NetworkId> real, followed, tags;
+  for (const auto& range : data.ranges) real.insert(range.anchor);
+  for (const auto& estimate : mission.estimates()) followed.insert(estimate.anchor);
+  EXPECT_TRUE(std::ranges::includes(followed, real)) << "heard first";
+  for (const auto& range : mission.joint_problem({}).flight.ranges) tags.insert(range.tag);
+  EXPECT_LE(tags.size(), k_most_live_tags);
 }
 
 TEST(LiveMission, TheSameRowsGiveTheSameEventsByteForByte) {

@@ -64,6 +64,27 @@ void expect_withheld(const FlightSolution& solution, const char* name, const cha
   }
 }
 
+// A server that is told to end waited minutes for the solution of a flight with thousands of anchors.
+TEST(SystematicErrors, ASolutionThatIsCanceledWhileItAsksForErrorsEndsThere) {
+  const FlightData flight = make_flight(turning(1));
+  std::size_t n_asked = 0, end_at = 0;
+  FlightOptions options;
+  options.canceled = [&] { return ++n_asked > end_at; };
+  end_at = ~std::size_t{0};
+  ASSERT_TRUE(solve_flight(flight, options));
+  const std::size_t n_all = n_asked;
+  // The last questions, one by one: errors of all ranges and of each anchor, then what is described.
+  for (std::size_t back = 1; back <= 12; ++back) {
+    n_asked = 0;
+    end_at = n_all - back;
+    const auto solution = solve_flight(flight, options);
+    ASSERT_FALSE(solution) << back;
+    EXPECT_EQ(solution.error().code, Errc::canceled);
+    EXPECT_EQ(n_asked, end_at + 1) << "it ends with the answer";
+  }
+  EXPECT_GT(n_all, 12U + flight.mission.tags.size());
+}
+
 TEST(SystematicErrors, WithholdsEveryAnchorWhereAllRangesHaveAFactor) {
   for (const double factor : {0.9, 0.97, 1.02, 1.05, 1.1}) {
     for (const std::uint64_t seed : {1, 2}) {
