@@ -33,7 +33,7 @@ std::string SentIds::trouble() const {
   return "it sends more than " +
          (tags ? std::to_string(k_most_live_tags) + " tag ids"
                : std::to_string(k_most_live_anchors) + " anchor ids") +
-         ": a flight follows only those heard first, all rows are stored; are tag and anchor of its mapping "
+         ": a flight follows the first of them only, all rows are stored; are tag and anchor of its mapping "
          "right?";
 }
 

@@ -337,6 +337,9 @@ Result<void> App::State::open_broker() {
 namespace {
 
 /// Where bundles are made and uploads wait, without what requests left that a stop cut off.
+/// As the alarm disk.low.
+constexpr std::uint64_t k_low_disk_bytes = std::uint64_t{2} << 30;
+
 fs::path emptied_spool(const fs::path& data_dir) {
   std::error_code none;
   fs::remove_all(data_dir / "spool", none);
@@ -367,6 +370,17 @@ std::vector<api::AlarmCondition> App::State::alarms() const {
                        ": anchord replay RECORDING --url URL sends them to the server, without storing any "
                        "of them twice",
                    std::nullopt});
+  if (auto ids = devices->too_many_ids(); !ids.empty())
+    out.push_back({"devices.ids", api::AlarmPriority::warning, std::move(ids), std::nullopt});
+  std::error_code unknown;
+  const auto space = fs::space(data_dir, unknown);
+  if (!unknown && space.available < k_low_disk_bytes)
+    if (const auto recordings = devices->recordings_on_disk(); !recordings.empty())
+      out.push_back(
+          {"disk.recordings", api::AlarmPriority::warning,
+           "the disk of the data is low: " + recordings +
+               "; switch off a device that sends noise, and move recordings of old flights elsewhere",
+           std::nullopt});
   if (!tls) return out;
   for (auto& warning : tls_warnings(tls->facts(), tls->failure(), clock.now()))
     out.push_back({std::move(warning.id),

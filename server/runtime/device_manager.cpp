@@ -18,6 +18,7 @@
 #include "drivers/device/discover.hpp"
 #include "drivers/link/address.hpp"
 #include "drivers/record/recorder.hpp"
+#include "server/runtime/device_alarms.hpp"
 #include "server/runtime/device_file.hpp"
 #include "server/runtime/device_metrics.hpp"
 #include "server/runtime/device_secrets.hpp"
@@ -259,7 +260,11 @@ class DeviceManager::Impl final : public device::DeviceListener {
 
   /// Made with the first device: a server without devices leaves no empty recordings.
   void open_recorder() {
-    auto made = record::Recorder::open(options_.data_dir / "recordings", SystemClock{}.now());
+    record::RecorderOptions recording;
+    recording.removed = [this](const std::filesystem::path& part) {
+      note("the disk is nearly full: removed the oldest raw recording without a flight, " + part.string());
+    };
+    auto made = record::Recorder::open(recordings(), SystemClock{}.now(), recording);
     if (made) {
       recorder_ = std::move(made).value();
       loop_->record_to(recorder_.get());
@@ -312,6 +317,10 @@ class DeviceManager::Impl final : public device::DeviceListener {
   void note(const std::string& text) const {
     if (options_.log) options_.log(text);
   }
+  std::filesystem::path recordings() const { return options_.data_dir / "recordings"; }
+  std::vector<device::DeviceState> states() {
+    return on_io([&] { return loop_ ? loop_->devices() : std::vector<device::DeviceState>{}; });
+  }
   std::filesystem::path file() const { return options_.data_dir / "devices.json"; }
 
   DeviceManagerOptions options_;
@@ -361,8 +370,7 @@ void DeviceManager::stop() { impl_->stop(); }
 std::vector<DeviceReport> DeviceManager::devices() {
   const auto kept = impl_->kept_devices();
   if (kept.empty()) return {};
-  const auto states = impl_->on_io(
-      [&] { return impl_->loop_ ? impl_->loop_->devices() : std::vector<device::DeviceState>{}; });
+  const auto states = impl_->states();
   std::vector<DeviceReport> out;
   for (const auto& [config, problem, entry] : kept) {
     const auto id = to_string(config.id);
@@ -565,6 +573,11 @@ std::string DeviceManager::recorder_failure() {
 std::string DeviceManager::not_started() { return impl_->not_started(); }
 
 std::uint64_t DeviceManager::rows_lost() { return impl_->unstored_.dropped(); }
+
+std::string DeviceManager::too_many_ids() { return server::too_many_ids(impl_->states()); }
+std::string DeviceManager::recordings_on_disk() {
+  return server::recordings_on_disk(impl_->recordings(), impl_->states());
+}
 
 std::string DeviceManager::metrics() { return device_metrics(devices(), rows_lost()); }
 

@@ -50,6 +50,11 @@ class DeviceManager final : public DeviceControl {
 
   /// Rows that were not stored in time; the recording has their bytes.
   std::uint64_t rows_lost();
+  /// Devices that send more ids than a flight follows, one line; empty: none.
+  std::string too_many_ids();
+  /// What the raw recordings take of the disk, where they are and which device writes most of them, one line;
+  /// empty: nothing worth moving.
+  std::string recordings_on_disk();
   /// Prometheus text of all devices.
   std::string metrics();
 

@@ -349,7 +349,7 @@ TEST(DeviceIds, ADeviceThatInventsThemIsToldAboutAndTakesNoMemory) {
   }
   EXPECT_EQ(
       ids.trouble(),
-      "it sends more than 64 tag ids: a flight follows only those heard first, all rows are stored; are tag "
+      "it sends more than 64 tag ids: a flight follows the first of them only, all rows are stored; are tag "
       "and anchor of its mapping right?");
 }
 
