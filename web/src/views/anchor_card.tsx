@@ -5,15 +5,18 @@ import { shown_estimate, task_of, task_reason } from '../state/done';
 import { replayed, watched_mission, watched_scene, now_ms, tick, watched_lost } from '../state/store';
 import { accuracy, age, fixed, metres, percent } from '../ui/format';
 import { Chip, Q, StatusChip } from '../ui/marks';
+import { useLater } from '../ui/use_later';
 import { why_not_done } from '../ui/words';
-import { Convergence } from './convergence';
 import { HoldButton } from './flight/hold_button';
 import { lease, order } from './flight/lease';
 import { flying } from './flight/words';
 import { Covariance, Loupe } from './loupe';
 
+const load_convergence = () => import('./convergence').then((m) => m.Convergence);
+
 export function AnchorCard({ anchor }: { anchor: string }) {
   tick.value;
+  const { part: Convergence } = useLater(load_convergence);
   const scene = watched_scene(),
     latest = scene?.anchors.get(anchor);
   if (!latest)
@@ -50,7 +53,7 @@ export function AnchorCard({ anchor }: { anchor: string }) {
       {e.enu_m && <Figures e={e} stale={stale} />}
       {!replayed.value && <WorkInFlight e={e} />}
       <div class="pair detail">
-        <Convergence anchor={anchor} />
+        {Convergence ? <Convergence anchor={anchor} /> : <figure class="conv" />}
         {e.ellipse95 && <Loupe e={e} />}
       </div>
       <div class="detail">{e.cov_enu_m2 && <Covariance c={e.cov_enu_m2} />}</div>
