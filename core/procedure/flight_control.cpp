@@ -87,8 +87,10 @@ void FlightControl::update_vehicle(double now_s, const DroneStatus& d) {
   }
   if (d.heading_deg) view.heading_rad = *d.heading_deg * k_degree;
   view.speed_mps = d.speed_mps.value_or(0);
-  view.armed = d.armed;
-  view.in_air = d.in_air;
+  // Two that answer as one: that one of them stands on the ground does not end the flight of the other.
+  const bool one = d.link_trouble.empty();
+  view.armed = armed_ = d.armed || (armed_ && !one);
+  view.in_air = in_air_ = d.in_air || (in_air_ && !one);
   if (d.battery_age_s < 10) view.battery = d.battery;
   view.battery_warning = d.battery_warning;
   if (d.battery_v) {

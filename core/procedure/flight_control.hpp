@@ -75,6 +75,7 @@ class FlightControl {
   Drone* drone_;
   Eigen::Vector3d home_m_;
   FlightEngine engine_;
+  bool armed_{false}, in_air_{false};  ///< as the procedure was told
   bool taken_over_{false}, explained_{false}, silent_{false}, adopts_{false}, over_{false}, repeats_{false};
   std::optional<Eigen::Vector3d> fix_m_, autopilot_m_, shift_m_;
   std::optional<double> fix_s_, smoothed_s_, sea_level_m_, steered_s_, sent_s_, cells_, cell_v_, cell_s_;

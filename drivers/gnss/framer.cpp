@@ -1,7 +1,8 @@
 #include "drivers/gnss/framer.hpp"
 
 #include <algorithm>
-#include <array>
+
+#include "core/base/crc24q.hpp"
 
 namespace anchord::gnss {
 namespace {
@@ -31,26 +32,6 @@ int hex_digit(char c) {
 
 bool printable(char c) { return c >= 0x20 && c < 0x7f; }
 bool digit(char c) { return c >= '0' && c <= '9'; }
-
-/// CRC-24Q of RTCM 10403.3 section 4.2, as a table for the bytes.
-constexpr std::array<std::uint32_t, 256> crc24q_table() {
-  std::array<std::uint32_t, 256> table{};
-  for (std::uint32_t i = 0; i < table.size(); ++i) {
-    std::uint32_t crc = i << 16;
-    for (int bit = 0; bit < 8; ++bit) crc = (crc << 1) ^ ((crc & 0x800000U) != 0 ? 0x1864CFBU : 0U);
-    table[i] = crc & 0xffffffU;
-  }
-  return table;
-}
-
-std::uint32_t crc24q(std::string_view bytes) {
-  static constexpr auto k_table = crc24q_table();
-  std::uint32_t crc = 0;
-  for (std::size_t i = 0; i < bytes.size(); ++i) {
-    crc = ((crc << 8) ^ k_table[((crc >> 16) ^ byte(bytes, i)) & 0xffU]) & 0xffffffU;
-  }
-  return crc;
-}
 
 enum class Start : std::uint8_t { no, maybe, yes };
 /// Whether the stream goes on with these bytes; maybe: so far, and more must come to know.

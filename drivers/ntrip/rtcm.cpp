@@ -1,33 +1,11 @@
 #include "drivers/ntrip/rtcm.hpp"
 
-#include <array>
 #include <cmath>
 #include <cstddef>
 
+#include "core/base/crc24q.hpp"
+
 namespace anchord::ntrip {
-
-namespace {
-
-/// One byte at a time: a stream of false preambles asks for a thousand bytes of checksum each.
-constexpr std::array<std::uint32_t, 256> make_table() {
-  std::array<std::uint32_t, 256> out{};
-  for (std::uint32_t byte = 0; byte < out.size(); ++byte) {
-    std::uint32_t crc = byte << 16;
-    for (int i = 0; i < 8; ++i) crc = crc << 1 ^ ((crc & 0x800000) != 0 ? 0x1864cfbu : 0);
-    out[byte] = crc & 0xffffff;
-  }
-  return out;
-}
-constexpr auto k_table = make_table();
-
-}  // namespace
-
-std::uint32_t crc24q(std::string_view bytes) {
-  std::uint32_t crc = 0;
-  for (const char c : bytes)
-    crc = (crc << 8 & 0xffffff) ^ k_table[(crc >> 16 ^ static_cast<unsigned char>(c)) & 0xff];
-  return crc;
-}
 
 namespace {
 

@@ -10,9 +10,6 @@
 
 namespace anchord::ntrip {
 
-/// CRC-24Q of RTCM 3 (polynomial 0x1864CFB, start 0).
-std::uint32_t crc24q(std::string_view bytes);
-
 /// Body (without header and checksum) of message 1005 or 1006; absent for another one, a short one, or a
 /// place that is not near the earth's surface (a base not yet told its own sends zeros). RTCM 10403.3,
 /// tables 3.5-6, 3.5-7.

@@ -187,6 +187,7 @@ class Twin {
              .set("type", 2)
              .set("autopilot", rig.autopilot.options().dialect == Autopilot::px4 ? 12 : 3)
              .set("base_mode", 0x51));
+    hear(Message("EXTENDED_SYS_STATE").set("landed_state", 1));
     hear(position(51.03, 3.72, 30'000, 0).set("time_boot_ms", 3'600'000 + std::llround(rig.now * 1000)));
   }
 
@@ -226,6 +227,24 @@ TEST_P(LinkTruth, TwoAutopilotsWithOneIdAreNoPilotInFlight) {
   EXPECT_TRUE(rig.control->taken_over()) << "nothing is commanded to two at once";
   EXPECT_NE(rig.reason().find("two autopilots answer as system 1"), std::string::npos) << rig.reason();
   EXPECT_EQ(rig.reason().find("pilot or a failsafe"), std::string::npos) << rig.reason();
+}
+
+TEST_P(LinkTruth, AnAutopilotOnTheGroundDoesNotEndTheFlightOfItsTwinInTheAir) {
+  AirRig rig(options());
+  ASSERT_TRUE(rig.fly());
+  rig.run(1);
+  Twin twin;
+  // So often that every round of the procedure sees what the other one says.
+  for (int i = 0; i < 240; ++i) {
+    twin.speak(rig);
+    rig.step();
+    ASSERT_FALSE(rig.done()) << rig.reason();
+  }
+  EXPECT_EQ(rig.step_now(), Step::hold);
+  rig.run(12);  // the other one is switched off
+  EXPECT_EQ(rig.session->status().link_trouble, "");
+  EXPECT_EQ(rig.act("land"), "");
+  EXPECT_TRUE(rig.run_until([&] { return rig.done(); }, 60)) << rig.reason();
 }
 
 TEST_P(LinkTruth, ARestartIsNoSecondAutopilot) {

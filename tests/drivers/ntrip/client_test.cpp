@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "core/base/base64.hpp"
+#include "core/base/crc24q.hpp"
 #include "drivers/device/settings.hpp"
 #include "tests/drivers/device/collect.hpp"
 
