@@ -43,7 +43,7 @@ footer{display:flex;justify-content:space-between;gap:20px;border-top:1px solid 
 .key{display:inline-block;width:14px;height:0;border-top:2px solid;vertical-align:middle;margin:0 4px 0 0}.key+span{margin-right:12px}
 svg text{font:10px system-ui,-apple-system,"Segoe UI",Roboto,"Noto Sans",sans-serif;fill:var(--ink2)}
 svg .id{font-weight:600;fill:#000;paint-order:stroke;stroke:#fff;stroke-width:3px}svg .t{paint-order:stroke;stroke:#fff;stroke-width:3px}
-table.gates{margin-bottom:8px;overflow-wrap:break-word}table.gates td{white-space:normal}table.gates td:first-child{min-width:18ch}
+table.gates{margin-bottom:8px;overflow-wrap:break-word}table.gates td{white-space:normal}table.gates td:first-child{min-width:18ch}table.gates th.num{min-width:7ch;overflow-wrap:anywhere}
 @media screen and (max-width:720px){body{font-size:13px}.sheet{width:auto;min-height:0;margin:0 0 8px;padding:16px}.meta{grid-template-columns:1fr 1fr}.fig,.cols,.plots,.sig{grid-template-columns:minmax(0,1fr)}table{display:block;overflow-x:auto}th,.lab,.acc p,.note,footer{font-size:12px}.top{flex-wrap:wrap;gap:8px}}
 .plot text.t{font-size:8.5px;stroke:none;fill:var(--ink3)}
 .grid{stroke:#e3e6e9;stroke-width:1}.axis{stroke:var(--edge);stroke-width:1}.wall{fill:none;stroke:#39424c;stroke-width:2.5}
