@@ -44,7 +44,9 @@ Result<const Projection*> GeoService::projection(int epsg, const Site& site) {
 }
 
 Result<GeoService::Projected> GeoService::projected(const std::optional<Site>& site, const Wgs84& at) {
-  if (!site || !site->projected_epsg)
+  if (!site)
+    return make_error(Errc::not_found, "the anchor is in no site: PATCH /anchors/{id} with its site");
+  if (!site->projected_epsg)
     return make_error(Errc::not_found, "no EPSG code is set (projected_epsg of the site)");
   BOOST_OUTCOME_TRY(const auto* map, this->projection(*site->projected_epsg, *site));
   BOOST_OUTCOME_TRY(const auto place, map->easting_northing_m(at));

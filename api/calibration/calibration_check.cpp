@@ -101,6 +101,10 @@ Result<void> check_answer(const CalibrationOrder& order, const CalibrationAnswer
                  " were asked");
   for (std::size_t i = 0; i < order.n_answered; ++i) {
     BOOST_OUTCOME_TRYV(check_flight(order, order.flights[i], answer.flights[i]));
+    // Else every flight could be said to be another's copy, and none would count.
+    const auto& original = answer.flights[i].copy_of;
+    if (original && (*original >= order.n_answered || answer.flights[*original].copy_of))
+      return unfit("flight \"" + order.flights[i].name + "\" is a copy of one that does not count");
   }
   for (const auto& [id, steps] : answer.course) {
     const bool heard = std::ranges::any_of(

@@ -21,7 +21,8 @@ using Json = nlohmann::json;
 
 namespace {
 
-Json flight_provenance(const CalibrationOrder::Flight& flight, const FlightAnswer& answer) {
+Json flight_provenance(const CalibrationOrder& order, std::size_t index, const FlightAnswer& answer) {
+  const CalibrationOrder::Flight& flight = order.flights[index];
   const FlightEvidence& s = answer.evidence;
   const auto valued = [](const Valued& v) { return Json{{"value", v.value}, {"sigma", v.sigma}}; };
   Json antennas = Json::array();
@@ -43,6 +44,7 @@ Json flight_provenance(const CalibrationOrder::Flight& flight, const FlightAnswe
           {"n_ranges", s.n_ranges},
           {"n_anchor_anchor", flight.n_anchor_anchor},
           {"n_used", s.n_used},
+          {"copy_of", answer.copy_of ? Json(to_string(order.flights[*answer.copy_of].id)) : Json(nullptr)},
           {"refused", s.refused},
           {"fixes_refused", answer.fixes_refused},
           {"exclusions", Json::parse(flight.exclusions_json, nullptr, false)},
@@ -211,9 +213,11 @@ Result<Calibration> record_of(const CalibrationOrder& order, CalibrationAnswer a
     flight.evidence.name = order.flights[i].name;
     flight.evidence.kit = order.flights[i].kit;
     out.missions.push_back(order.flights[i].id);
-    by_anchor.add(flight);
-    flights.push_back(flight_provenance(order.flights[i], flight));
-    for (const auto& estimate : flight.uncorrected) raw[estimate.anchor].push_back(estimate);
+    flights.push_back(flight_provenance(order, i, flight));
+    if (!flight.copy_of) {
+      by_anchor.add(flight);
+      for (const auto& estimate : flight.uncorrected) raw[estimate.anchor].push_back(estimate);
+    }
     evidence.flights.push_back(std::move(flight.evidence));
   }
   Json budgets = fuse_anchors(by_anchor, order.base_sigma_m, frame, out);

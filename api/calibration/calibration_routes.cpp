@@ -244,25 +244,29 @@ std::vector<NetworkId> chosen(const Calibration& calibration, const PublishReque
   return out;
 }
 
-/// Of who is bound to sites: an anchor that was never published and has no site comes into the site of the
-/// calibration; one of another site is not theirs to publish.
-void claim_anchors(CalibrationApi& s, const Request& request, const Calibration& calibration,
-                   const std::vector<NetworkId>& anchors) {
+/// Anchors that have no site come into that of the calibration; answers those of another one. Who is bound to
+/// sites may publish none of another, and takes none that others published before it had a site.
+std::vector<Anchor> claim_anchors(CalibrationApi& s, const Request& request, const Calibration& calibration,
+                                  const std::vector<NetworkId>& anchors) {
   const SiteSet sites = current_sites();
-  if (sites.all()) return;
-  const auto site = value_or_problem(s.mission_store.mission(calibration.missions.front())).site;
+  const auto flown = s.mission_store.mission(calibration.missions.front());
+  if (!flown && sites.all()) return {};
+  const auto site = value_or_problem(flown).site;
+  if (!site && sites.all()) return {};
   // As they are for all: what is not seen is told from what nobody has.
   const ForSites all{SiteSet{}};
-  std::vector<Anchor> free;
+  std::vector<Anchor> free, elsewhere;
   std::vector<FieldError> errors;
   for (const auto& id : anchors) {
     auto anchor = value_or_problem(s.anchors.find_or_create(id, s.clock.now()));
-    if (sites.holds(anchor.site)) continue;
-    if (!anchor.site && value_or_problem(s.revisions.history(id)).empty())
+    if (anchor.site && sites.holds(anchor.site)) {
+      if (anchor.site != site) elsewhere.push_back(std::move(anchor));
+    } else if (!anchor.site && (sites.all() || value_or_problem(s.revisions.history(id)).empty())) {
       free.push_back(std::move(anchor));
-    else
+    } else {
       errors.push_back({"/anchors", "not_yours",
                         to_string(id) + " is no anchor of the sites that this token is bound to"});
+    }
   }
   if (!errors.empty())
     throw_problem(409, "conflict",
@@ -274,6 +278,7 @@ void claim_anchors(CalibrationApi& s, const Request& request, const Calibration&
     value_or_problem(s.anchors.update(anchor, anchor.version));
     s.audit(request, "anchor.change " + to_string(anchor.network_id) + " site: " + to_string(*site));
   }
+  return elsewhere;
 }
 
 Response publish(CalibrationApi& s, const Request& request) {
@@ -285,7 +290,7 @@ Response publish(CalibrationApi& s, const Request& request) {
   ask_whether_moved(s, calibration);
   std::vector<Override> overrides;
   const auto anchors = chosen(calibration, wanted, overrides, request.principal.token_id);
-  claim_anchors(s, request, calibration, anchors);
+  const auto elsewhere = claim_anchors(s, request, calibration, anchors);
   // Audited before it happens: a publication that nobody can be asked about must not exist.
   s.audit(request, "calibration.publish " + to_string(calibration.id));
   for (const auto& one : overrides) {
@@ -307,9 +312,12 @@ Response publish(CalibrationApi& s, const Request& request) {
   announce_revision(s, revision, anchors.size(), overrides.size());
   Ordered answer = revision_json(revision);
   Ordered taken = Ordered::array(), left = Ordered::array(), overridden = Ordered::array(),
-          over = Ordered::array();
+          over = Ordered::array(), of_other_sites = Ordered::array();
   const auto flown = s.goals.flown(calibration.missions);
   for (const auto& id : anchors) taken.push_back(to_string(id));
+  for (const auto& anchor : elsewhere)
+    of_other_sites.push_back(
+        {{"network_id", to_string(anchor.network_id)}, {"site", to_string(*anchor.site)}});
   for (const auto& one : overrides)
     overridden.push_back({{"network_id", to_string(one.anchor)}, {"reason", one.reason}});
   for (const auto& estimate : calibration.anchors) {
@@ -330,6 +338,7 @@ Response publish(CalibrationApi& s, const Request& request) {
   answer["overrides"] = std::move(overridden);
   answer["left_out"] = std::move(left);
   answer["over_goal"] = std::move(over);
+  answer["of_other_sites"] = std::move(of_other_sites);
   Response response = json_response(201, answer);
   response.header("Location", "/api/v1/anchors?revision=" + std::to_string(revision.number));
   return response;

@@ -5,6 +5,7 @@
 
 #include "api/calibration/kit_profiles.hpp"
 #include "core/localize/convergence.hpp"
+#include "core/localize/flight_copies.hpp"
 
 namespace anchord::api {
 namespace {
@@ -126,6 +127,13 @@ FlightAnswer answer_of(const FlightData& flight, const FlightSolution& solution,
   return out;
 }
 
+/// Among the flights that are answered: what others only teach about a kit is in no anchor.
+std::vector<std::optional<std::size_t>> copies_of(const CalibrationTask& task) {
+  std::vector<const FlightData*> answered;
+  for (std::size_t i = 0; i < task.n_answered; ++i) answered.push_back(&task.flights[i]);
+  return flight_copies(answered);
+}
+
 }  // namespace
 
 bool teaches(const FlightOptions& options) {
@@ -140,6 +148,7 @@ bool profiles_used(bool wanted, const std::vector<FlightModelsReport>& models) {
 
 Result<CalibrationAnswer> solve_calibration(CalibrationTask& task, const CalibrationProgress& progress) {
   progress(0, std::to_string(task.flights.size()) + " flights");
+  const auto copies = copies_of(task);
   Solved solved{task.flights};
   std::vector<FlightData> received;
   Solved raw{received};
@@ -151,6 +160,10 @@ Result<CalibrationAnswer> solve_calibration(CalibrationTask& task, const Calibra
   CalibrationAnswer out;
   for (std::size_t i = 0; i < task.n_answered; ++i) {
     FlightAnswer& flight = out.flights.emplace_back(answer_of(task.flights[i], *solved.solutions[i], origin));
+    flight.copy_of = copies[i];
+    // Those of one kit were solved together, and say it themselves.
+    if (copies[i] && task.flights[i].mission.kit != task.flights[*copies[i]].mission.kit)
+      flight.evidence.notes.push_back(copy_note(task.flights[*copies[i]].mission.name));
     if (raw.flights.empty() || !task.compare_uncorrected) continue;
     for (const auto& anchor : raw.solutions[i]->anchors) flight.uncorrected.push_back(anchor.estimate);
   }

@@ -46,6 +46,8 @@ struct FlightAnswer {
   std::vector<Estimate> uncorrected;  ///< without the models; empty: not asked
   FlightEvidence evidence;
   std::map<std::string, std::size_t> fixes_refused;
+  /// Which flight of the task has its ranges already, of whatever kit: then this one tells nothing anew.
+  std::optional<std::uint64_t> copy_of{};
 };
 
 struct CalibrationAnswer {

@@ -315,11 +315,12 @@ void fields(P& p, Packed<P, ConvergenceStep>& v) {
 }
 template <class P>
 void fields(P& p, Packed<P, FlightAnswer>& v) {
-  auto& [anchors, uncorrected, evidence, fixes_refused] = v;
+  auto& [anchors, uncorrected, evidence, fixes_refused, copy_of] = v;
   p.list(anchors, k_most_anchors);
   p.list(uncorrected, k_most_anchors);
   p(evidence);
   p.map(fixes_refused, k_most_reasons);
+  p(copy_of);
 }
 
 namespace {

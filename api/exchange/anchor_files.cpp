@@ -58,7 +58,8 @@ FileHeight checked_height(const Anchors& anchors, const Request& request) {
   if (height == FileHeight::orthometric)
     complete(
         anchors, [](const auto& f) { return !f.height_orthometric_m; }, "height above the geoid",
-        "install a geoid model (geoid.dir), or use height=ellipsoidal");
+        "install a geoid model (geographiclib-get-geoids egm2008-5, or one in the folder of the setting "
+        "geoid.dir) and restart the server, or use height=ellipsoidal");
   return height;
 }
 
@@ -88,6 +89,21 @@ std::string bytes_of(ExchangeApi& s, std::string_view format, const Anchors& anc
   return anchors_pozyx(anchors);
 }
 
+/// A drawing does not show what is missing. Of a site none of whose anchors is known to be there, nothing is
+/// drawn: where others are published that are in no site, they are most likely those.
+void refuse_if_homeless(ExchangeApi& s, const Request& request) {
+  if (!request.query.contains("site")) return;
+  Request any = request;
+  any.query.erase("site");
+  std::uint64_t number = 0;
+  std::vector<std::string> ids;
+  for (const auto& feature : selected_anchors(s.anchors, any, number))
+    if (!feature.anchor.site) ids.push_back(to_string(feature.anchor.network_id));
+  if (!ids.empty())
+    refuse("no published anchor is of this site, and " + some_of(ids) + (ids.size() == 1 ? " is" : " are") +
+           " in no site: PATCH /anchors/{id} with its site");
+}
+
 }  // namespace
 
 Response anchor_file(ExchangeApi& s, std::string_view format, const Request& request) {
@@ -100,6 +116,7 @@ Response anchor_file(ExchangeApi& s, std::string_view format, const Request& req
     check_query(request, {"revision", "site", "bbox", "format"});
   std::uint64_t number = 0;
   const auto anchors = selected_anchors(s.anchors, request, number);
+  if (anchors.empty()) refuse_if_homeless(s, request);
   Response response;
   response.body = bytes_of(s, format, anchors, request);
   response.header("Content-Type", std::string(file->type));

@@ -222,7 +222,8 @@ std::optional<Lease> FlightService::control() {
 bool FlightService::flies(const MissionId& mission) {
   auto w = state_->work.lock();
   const auto* f = w->operations.flight_of(mission);
-  return f != nullptr && f->flying();
+  // What was aborted in the air is up there still, whoever flies it.
+  return f != nullptr && (f->flying() || w->last.flew);
 }
 
 std::optional<MissionId> FlightService::flown_with(const PlanId& plan) {

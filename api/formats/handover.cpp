@@ -96,16 +96,20 @@ Result<PackVerdict> verify_pack(const std::filesystem::path& file, const std::op
   }
   verdict.kind = PackVerdict::Kind::bundle;
   if (!zip.has(k_bundle_manifest))
-    return make_error(Errc::bad_frame,
-                      "this is neither a hand-over pack nor a flight bundle: it has neither " +
-                          std::string(k_pack_sums) + " nor " + std::string(k_bundle_manifest));
-  const auto manifest = checked_bundle(zip);
-  if (!manifest)
-    verdict.faults.push_back(manifest.error().message);
+    return make_error(Errc::bad_frame, "this is neither a hand-over pack nor a bundle: it has neither " +
+                                           std::string(k_pack_sums) + " nor " +
+                                           std::string(k_bundle_manifest));
+  const auto hold = [&](const auto& manifest) {
+    if (!manifest)
+      verdict.faults.push_back(manifest.error().message);
+    else
+      verdict.n_files = manifest.value().entries.size();
+  };
+  if (is_site_bundle(zip))
+    hold(checked_site_bundle(zip));
   else
-    verdict.n_files = manifest.value().entries.size();
-  if (key)
-    verdict.faults.emplace_back("a flight bundle has no signature of its own: give the hand-over pack");
+    hold(checked_bundle(zip));
+  if (key) verdict.faults.emplace_back("a bundle has no signature of its own: give the hand-over pack");
   return verdict;
 }
 

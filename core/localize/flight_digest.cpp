@@ -32,11 +32,9 @@ class Gathered {
   std::size_t n_{0};
 };
 
-}  // namespace
-
-std::string flight_digest(const FlightData& flight) {
+std::string digest_since(UtcTime origin, const FlightData& flight) {
   Gathered sha;
-  const auto add_time = [&](UtcTime time) { sha.add(static_cast<std::uint64_t>(time.ns)); };
+  const auto add_time = [&](UtcTime time) { sha.add(static_cast<std::uint64_t>(time.ns - origin.ns)); };
   for (const Fix& fix : flight.fixes) {
     add_time(fix.time);
     if (fix.frame == TrackFrame::local) {
@@ -56,5 +54,18 @@ std::string flight_digest(const FlightData& flight) {
   }
   return sha.hex().substr(0, 32);
 }
+
+}  // namespace
+
+std::string flight_digest(const FlightData& flight) {
+  UtcTime first{};
+  if (!flight.fixes.empty())
+    first = flight.fixes.front().time;
+  else if (flight.n_ranges() > 0)
+    first = flight.range(0).time;
+  return digest_since(first, flight);
+}
+
+std::string dated_flight_digest(const FlightData& flight) { return digest_since(UtcTime{}, flight); }
 
 }  // namespace anchord

@@ -8,6 +8,7 @@
 #include "core/localize/clock_offset.hpp"
 #include "core/localize/direction_doubt.hpp"
 #include "core/localize/flight_checks.hpp"
+#include "core/localize/flight_copies.hpp"
 #include "core/localize/flight_digest.hpp"
 #include "core/localize/flight_verdict.hpp"
 #include "core/localize/joint_rounds.hpp"
@@ -36,7 +37,8 @@ struct Work {
   SharedPrior prior{};
   ProfileFactor factor{};
   ProfileFactor alone{};  ///< what the flight said before it was told anything
-  std::string kit{}, name{}, digest{};
+  std::string kit{}, name{}, digest{}, dated_digest{};
+  std::optional<std::size_t> copy_of{};  ///< which of the flights has its ranges already
   BiasGate gate{};
   std::vector<Gate> checks{};                ///< of the whole flight: every anchor must pass them
   std::vector<Gate> unseen_arm{};            ///< one for each anchor, where it is asked
@@ -109,11 +111,17 @@ bool same_kit(const Work& a, const Work& b) { return !a.kit.empty() && a.kit == 
 
 /// The very same flight? By content; profiles of old tell flights apart by name alone.
 bool same_flight(const Work& work, const ProfileFactor& factor) {
-  return factor.digest.empty() ? work.name == factor.flight : work.digest == factor.digest;
+  if (factor.digest.empty()) return work.name == factor.flight;
+  return work.digest == factor.digest || work.dated_digest == factor.digest;
 }
 
 bool profile_fits(const Work& work, const FlightOptions& options) {
   return options.profile && (options.profile->kit.empty() || options.profile->kit == work.kit);
+}
+
+/// The flight that counts for this one: itself, or the one whose copy it is.
+std::size_t original(const std::vector<Work>& all, std::size_t index) {
+  return all[index].copy_of.value_or(index);
 }
 
 /// Factors of the other flights of the kit: those solved now, and the stored profile's; this very flight is
@@ -123,8 +131,9 @@ std::vector<ProfileFactor> others_of(const std::vector<Work>& all, std::size_t i
   std::vector<ProfileFactor> factors;
   std::set<std::string> counted{all[index].digest};
   for (std::size_t i = 0; i < all.size(); ++i) {
-    if (i != index && same_kit(all[i], all[index]) && counted.insert(all[i].digest).second)
-      factors.push_back(all[i].factor);
+    if (i == original(all, index) || all[i].copy_of || !same_kit(all[i], all[index])) continue;
+    counted.insert(all[i].digest);
+    factors.push_back(all[i].factor);
   }
   if (!profile_fits(all[index], options)) return factors;
   for (const auto& factor : options.profile->factors) {
@@ -162,14 +171,8 @@ void set_arm_sigma(const FlightData& flight, Work& work) {
 
 /// What of the given knowledge about the kit was not used, for people.
 void note_unused(std::vector<Work>& all, const FlightOptions& options) {
-  for (std::size_t i = 0; i < all.size(); ++i) {
-    Work& work = all[i];
-    for (std::size_t k = 0; k < i; ++k) {
-      if (all[k].digest != work.digest) continue;
-      work.rows.notes.push_back("the same flight as " + all[k].name +
-                                ", with identical ranges: it counts once");
-      break;
-    }
+  for (Work& work : all) {
+    if (work.copy_of) work.rows.notes.push_back(copy_note(all[*work.copy_of].name));
     if (options.profile && !profile_fits(work, options)) {
       work.rows.notes.push_back("the profile is of kit '" + options.profile->kit + "', this flight of kit '" +
                                 work.kit + "': not used");
@@ -410,8 +413,11 @@ Result<std::vector<FlightSolution>> solve_flights(std::span<const FlightData* co
     work.kit = flight->mission.kit;
     work.name = flight->mission.name;
     work.digest = flight_digest(*flight);
+    if (options.profile) work.dated_digest = dated_flight_digest(*flight);
     all.push_back(std::move(work));
   }
+  const auto copies = flight_copies(flights);
+  for (std::size_t i = 0; i < all.size(); ++i) all[i].copy_of = copies[i];
   note_unused(all, options);
   for (Work& work : all) {
     BOOST_OUTCOME_TRY(solve_with(work, for_antennas(wide_prior(options), work)));
@@ -450,7 +456,7 @@ Result<std::vector<FlightSolution>> solve_flights(std::span<const FlightData* co
   if (profile) {
     profile->kit = all.empty() ? "" : all.front().kit;
     profile->factors = all.empty() ? std::vector<ProfileFactor>{} : others_of(all, 0, options);
-    if (!all.empty()) profile->factors.push_back(all.front().factor);
+    if (!all.empty()) profile->factors.push_back(all[original(all, 0)].factor);
   }
   BOOST_OUTCOME_TRYV(go_on(options));
   std::vector<FlightSolution> solutions;

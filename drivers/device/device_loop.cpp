@@ -51,12 +51,20 @@ class Rate {
   std::int64_t second_{0};
 };
 
-/// For a device whose bytes make no frame.
-std::string unreadable(const Settings& settings, const link::Address& address) {
+/// For a device whose bytes make no frame, or whose messages give no row.
+std::string unreadable(const Settings& settings, const link::Address& address,
+                       const std::map<std::string, std::uint64_t>& dropped) {
   if (settings.kind == "ntrip")
     return "bytes are received, but they make no frame of RTCM 3, and nothing else goes to receivers: choose "
            "a "
            "mount of RTCM 3";
+  const bool mapped = settings.kind == "mqtt" || settings.kind == "ndjson";
+  if (mapped && !dropped.empty()) {
+    const auto most =
+        std::ranges::max_element(dropped, {}, &std::map<std::string, std::uint64_t>::value_type::second);
+    return "messages are received, but none of them can be used, most of them for " + most->first +
+           ": correct the mapping, or what the device sends";
+  }
   std::string out = "bytes are received, but they make no frame: is it a " + settings.kind + " device";
   if (settings.kind == "gnss") out += " that sends the format that is set (auto accepts any)";
   if (address.kind == link::Kind::serial)
@@ -85,6 +93,7 @@ struct Entry {
   std::string notice;  ///< of this link's driver
   Noise noise{};
   SentIds ids{};
+  BaseWatch base_watch{};
 };
 
 }  // namespace
@@ -160,6 +169,7 @@ class DeviceLoop::Impl final : public PipelineSink, public std::enable_shared_fr
   void record_into(const std::optional<MissionId>& mission) {
     const auto text = mission ? to_string(*mission) : std::string();
     (void)take({EventKind::mission, 0, link::arrival_now(), text});
+    for (auto& [slot, entry] : entries_) entry.base_watch.flight(mission.has_value());
   }
 
   void record_to(record::Recorder* recorder) {
@@ -248,7 +258,10 @@ class DeviceLoop::Impl final : public PipelineSink, public std::enable_shared_fr
     if (const auto found = entries_.find(slot); found != entries_.end()) found->second.told.clock = reading;
   }
   void base(std::uint16_t slot, const BaseStation& station) override {
-    if (const auto found = entries_.find(slot); found != entries_.end()) found->second.told.base = station;
+    const auto found = entries_.find(slot);
+    if (found == entries_.end()) return;
+    found->second.told.base = station;
+    found->second.base_watch.note(station);
   }
   void heard(std::uint16_t slot) override {
     const auto found = entries_.find(slot);
@@ -304,8 +317,11 @@ class DeviceLoop::Impl final : public PipelineSink, public std::enable_shared_fr
     out.phase = entry.supervision.phase;
     out.reason = entry.supervision.reason;
     out.too_many_ids = entry.ids.trouble();
+    out.moved_base = entry.base_watch.trouble();
     if (out.phase == Phase::talking && out.reason.empty())
-      out.reason = entry.notice.empty() ? out.too_many_ids : entry.notice;
+      out.reason = !entry.notice.empty()     ? entry.notice
+                   : !out.moved_base.empty() ? out.moved_base
+                                             : out.too_many_ids;
     const auto at = now();
     out.in_phase_s = static_cast<double>(at - entry.supervision.since_ns) * 1e-9;
     out.rows_per_s = entry.rate.value(at);
@@ -313,7 +329,7 @@ class DeviceLoop::Impl final : public PipelineSink, public std::enable_shared_fr
       out.bytes_in += entry.link->counters().bytes_in;
       out.bytes_out += entry.link->counters().bytes_out;
       if (out.phase == Phase::silent && entry.link->counters().bytes_in > entry.bytes_understood)
-        out.reason = unreadable(entry.settings, entry.address) +
+        out.reason = unreadable(entry.settings, entry.address, out.dropped) +
                      (entry.noise.skipped() ? " Only a sample of them is recorded." : "");
     }
     return out;

@@ -10,6 +10,7 @@
 
 #include "core/base/ids.hpp"
 #include "core/base/result.hpp"
+#include "drivers/device/base_watch.hpp"
 #include "drivers/device/bounds.hpp"
 #include "drivers/device/supervisor.hpp"
 #include "drivers/port/driver.hpp"
@@ -29,7 +30,8 @@ struct DeviceState {
   Phase phase{Phase::lost};
   std::string reason;        ///< why it is not talking; while it talks, what is wrong with what it says
   std::string too_many_ids;  ///< what is wrong with the ids it sends, and what to do; empty: nothing
-  std::string conflict;      ///< two devices on one port, or one identity on two devices; empty: none
+  std::string moved_base;  ///< what became of the base behind its corrections in this flight; empty: nothing
+  std::string conflict;    ///< two devices on one port, or one identity on two devices; empty: none
   double in_phase_s{0};
   std::optional<UtcTime> last_seen{};
   Identity identity;

@@ -66,6 +66,7 @@ void Session::forget_vehicle() {
   pending_.clear();
   sent_.clear();
   telemetry_ = Telemetry();
+  lists_lost("another aircraft is on the link since");
   if (transfer_) {
     transfer_->check = false;
     end_transfer(CommandState::unconfirmed, "another aircraft is on the link now");
@@ -83,7 +84,9 @@ void Session::handle(const mavlink::Received& in) {
   if (in.from != vehicle_) return;
   keep_alive();
   if (m.is("COMMAND_ACK")) return on_ack(m);
+  const int lives = telemetry_.restarts();
   telemetry_.receive(m, autopilot_, now_s_);
+  if (telemetry_.restarts() != lives) lists_lost("the autopilot was restarted since");
   on_transfer(m);
 }
 
@@ -103,6 +106,12 @@ void Session::on_heartbeat(const mavlink::Received& in) {
     // One vehicle a session: the first heard, until it is silent for long and was not armed.
     if (now_s_ - *last_seen_s_ <= k_vehicle_kept_s || telemetry_.armed()) return;
     forget_vehicle();
+  }
+  if (last_seen_s_ && now_s_ - *last_seen_s_ > k_vehicle_kept_s && !telemetry_.armed()) {
+    // Long enough to switch another one on under the same id.
+    telemetry_.restarted();
+    lists_lost("the aircraft was not heard for " + std::to_string(static_cast<int>(now_s_ - *last_seen_s_)) +
+               " s since, and may be another one");
   }
   vehicle_ = in.from;
   autopilot_ = autopilot_of(m.integer("autopilot"));

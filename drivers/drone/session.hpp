@@ -148,14 +148,17 @@ class Session final : public Drone {
     std::size_t count{}, next{};
     double last_s{};
     int tries{0};
-    bool check{false};                ///< of an upload: is read back
-    std::vector<MissionItem> wanted;  ///< of the reading back
+    bool check{false};                  ///< of an upload: is read back
+    std::vector<MissionItem> wanted;    ///< of the reading back
+    std::vector<std::uint8_t> asked{};  ///< how often, of each item of an upload
   };
 
   void handle(const mavlink::Received& in);
   void on_heartbeat(const mavlink::Received& in);
   void on_ack(const mavlink::Message& m);
   void on_transfer(const mavlink::Message& m);
+  void on_foreign_transfer(const mavlink::Message& m);
+  void lists_lost(const std::string& why);
   void on_answer(Pending& done, std::int64_t result);
   void send(const mavlink::Message& message);
   void send_command(const mavlink::Message& message, int command, std::uint64_t number);
@@ -210,6 +213,7 @@ class Session final : public Drone {
   std::deque<Sent> sent_;
   std::optional<Flight> flight_;
   std::optional<Transfer> transfer_;
+  std::map<ItemList, std::uint64_t> kept_;  ///< the upload that the autopilot has of each list, read back
   std::vector<MissionItem> items_;
   std::vector<CommandReport> reports_;
 };

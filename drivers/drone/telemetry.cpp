@@ -53,8 +53,8 @@ std::optional<double> Telemetry::home_msl_m() const {
   return status_.home ? std::optional(status_.home->height_m) : std::nullopt;
 }
 
-/// Another life of the autopilot: what it said in the last one is no longer so.
 void Telemetry::restarted() {
+  ++restarts_;
   for (auto& s : streams_) {
     s.last_seen_s = s.asked_s = -1e9;
     s.asked = 0;

@@ -28,6 +28,10 @@ class Telemetry {
   std::optional<mavlink::Message> question(Autopilot autopilot, double now_s);
   void answer(std::int64_t result);  ///< to the newest 511
   void ask_parameters(const std::vector<std::string>& names);
+  /// Another life of the autopilot, or another one in its place: what was said before is no longer so.
+  void restarted();
+  /// How often that was.
+  int restarts() const { return restarts_; }
 
   void fill(DroneStatus& out, double now_s) const;
   const DroneStatus& newest() const { return status_; }
@@ -58,7 +62,6 @@ class Telemetry {
     int asked{0};
   };
 
-  void restarted();
   void receive_status_text(const mavlink::Message& m, double now_s);
   void receive_position(const mavlink::Message& m, double now_s);
   void receive_battery(const mavlink::Message& m, double now_s);
@@ -71,6 +74,7 @@ class Telemetry {
   double position_s_{-1e9}, battery_s_{-1e9}, question_s_{-1e9}, warning_s_{-1e9};
   std::optional<std::size_t> open_;  ///< stream whose question has no answer yet
   std::int64_t boot_ms_{0}, landed_{0};
+  int restarts_{0};
   std::string warning_;
   TwinWatch twins_;
 };

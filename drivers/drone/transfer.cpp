@@ -11,11 +11,13 @@ using mavlink::Message;
 
 constexpr double k_wait_s = 1.5;
 constexpr int k_transfer_tries = 5;
+constexpr std::uint8_t k_same_item = 10;  // with a third of the frames lost, once in 5000 transfers
 constexpr std::size_t k_max_items = 1000;
 
 // MAV_CMD and MAV_FRAME of the common set.
 constexpr int k_waypoint = 16, k_fence_inside = 5001, k_fence_outside = 5002;
 constexpr int k_global = 0, k_above_home = 6;
+constexpr int k_all_lists = 255;  // MAV_MISSION_TYPE_ALL
 
 std::string list_word(ItemList list) { return list == ItemList::fence ? "fence" : "mission"; }
 
@@ -54,6 +56,28 @@ std::string difference(const std::vector<MissionItem>& wanted, const std::vector
     if (!alike(wanted[i], kept[i])) return "the autopilot stored a different item " + std::to_string(i);
   }
   return {};
+}
+
+/// MAV_MISSION_RESULT of the common set.
+std::string result_words(std::int64_t type) {
+  switch (type) {
+    case 1:
+      return "the autopilot refuses it without a reason";
+    case 2:
+      return "the autopilot does not know the frame of an item";
+    case 3:
+      return "the autopilot does not support this list";
+    case 4:
+      return "the autopilot has no space for so many items";
+    case 13:
+      return "the autopilot got the items out of order";
+    case 14:
+      return "the autopilot takes no list from this ground station";
+    case 15:
+      return "the autopilot canceled the transfer";
+    default:
+      return "the autopilot refuses an item as invalid (MISSION_ACK type " + std::to_string(type) + ")";
+  }
 }
 
 }  // namespace
@@ -97,9 +121,11 @@ std::uint64_t Session::upload(ItemList list, std::vector<MissionItem> items) {
            transfer_ ? "another transfer is running" : "more than 1000 items");
     return number;
   }
+  kept_.erase(list);
   report(number, "upload", CommandState::sent, list_word(list));
   transfer_ = Transfer{number, true, list, std::move(items), 0, 0, now_s_ - k_wait_s, 0, false, {}};
   transfer_->count = transfer_->items.size();
+  transfer_->asked.resize(transfer_->count);
   drive_transfer();
   return number;
 }
@@ -116,6 +142,12 @@ std::uint64_t Session::download(ItemList list) {
   return number;
 }
 
+/// What was read back is no longer known to be there.
+void Session::lists_lost(const std::string& why) {
+  for (const auto& [list, number] : std::exchange(kept_, {}))
+    report(number, "upload", CommandState::unconfirmed, why);
+}
+
 void Session::end_transfer(CommandState state, std::string text) {
   const Transfer done = *std::exchange(transfer_, std::nullopt);
   if (state == CommandState::accepted && done.up && done.check) {
@@ -126,10 +158,11 @@ void Session::end_transfer(CommandState state, std::string text) {
   if (state == CommandState::accepted && done.check) {
     const bool home_first = done.list == ItemList::mission && dialect_of(autopilot_).home_is_item_0;
     if (auto differs = difference(done.wanted, items_, home_first ? 1 : 0); !differs.empty()) {
-      state = CommandState::refused;
+      state = CommandState::unconfirmed;  // and sent again: nothing of it was refused
       text = std::move(differs);
     } else {
       text += ", read back";
+      kept_[done.list] = done.number;
     }
   }
   report(done.number, done.up || done.check ? "upload" : "download", state, std::move(text));
@@ -169,8 +202,30 @@ void Session::drive_transfer() {
   }
 }
 
+/// What the autopilot tells another ground station of a list: taken, it is no longer the one from here.
+void Session::on_foreign_transfer(const Message& m) {
+  if (!m.is("MISSION_ACK") || m.integer("type") != 0) return;
+  const auto replaced = m.integer("mission_type");
+  for (auto kept = kept_.begin(); kept != kept_.end();) {
+    const bool all = replaced == k_all_lists;
+    if (!all && replaced != static_cast<std::int64_t>(kept->first)) {
+      ++kept;
+      continue;
+    }
+    report(kept->second, "upload", CommandState::unconfirmed,
+           "another ground station (system " + std::to_string(m.integer("target_system")) +
+               ") has replaced the " + list_word(kept->first) + " in the autopilot since");
+    kept = kept_.erase(kept);
+  }
+}
+
 void Session::on_transfer(const Message& m) {
-  if (!transfer_) return;
+  const bool is_list = m.is("MISSION_ACK") || m.is("MISSION_REQUEST_INT") || m.is("MISSION_REQUEST") ||
+                       m.is("MISSION_COUNT") || m.is("MISSION_ITEM_INT");
+  const auto target = is_list ? m.integer("target_system") : 0;
+  if (target != 0 && target != options_.self.system) return on_foreign_transfer(m);
+  if (!transfer_ || (is_list && m.integer("mission_type") != static_cast<std::int64_t>(transfer_->list)))
+    return;
   auto& t = *transfer_;
   const auto answered = [&] {
     t.tries = 0;
@@ -179,16 +234,19 @@ void Session::on_transfer(const Message& m) {
   if (t.up && (m.is("MISSION_REQUEST_INT") || m.is("MISSION_REQUEST"))) {
     const auto seq = m.integer("seq");
     if (seq >= 0 && static_cast<std::size_t>(seq) < t.items.size()) {
+      // Whoever asks for one again and again gets nothing: it must end, for nothing else can be sent
+      // meanwhile.
+      if (++t.asked[static_cast<std::size_t>(seq)] > k_same_item)
+        return end_transfer(CommandState::unconfirmed,
+                            "the autopilot asks for item " + std::to_string(seq) +
+                                " again and again: does the link lose long frames?");
       answered();
       send_item(static_cast<std::size_t>(seq));
     }
   } else if (t.up && m.is("MISSION_ACK")) {
-    if (m.integer("mission_type") != static_cast<std::int64_t>(t.list)) return;
     const auto type = m.integer("type");
     end_transfer(type == 0 ? CommandState::accepted : CommandState::refused,
-                 type == 0   ? std::to_string(t.count) + " items"
-                 : type == 3 ? "the autopilot does not support this list"
-                             : "MISSION_ACK type " + std::to_string(type));
+                 type == 0 ? std::to_string(t.count) + " items" : result_words(type));
   } else if (!t.up && m.is("MISSION_COUNT") && t.count == 0) {
     answered();
     t.count = static_cast<std::size_t>(m.integer("count"));

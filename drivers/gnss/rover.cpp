@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <utility>
 
 #include "drivers/time/time_base.hpp"
 
@@ -16,6 +17,7 @@ constexpr std::int64_t k_quiet_ns = 50'000'000;  ///< beyond the 16 ms of USB co
 constexpr std::int64_t k_forget_ns = 5'000'000'000;  ///< a format unheard for so long is left for another
 constexpr std::int64_t k_undated_ns = 5'000'000'000;
 constexpr std::int64_t k_jump_ns = 10'000'000'000;
+constexpr std::int64_t k_same_step_ns = 2'000'000'000;
 
 /// How much a format says of one epoch.
 int worth(Protocol protocol) {
@@ -84,6 +86,8 @@ void Rover::opened(const Arrival& now) {
   speaks_.reset();
   undated_since_ns_.reset();
   newest_.reset();
+  most_ahead_ns_.reset();
+  step_ns_.reset();
   burst_ = given_ = now;
   last_ = {};
   if (options_.format == Protocol::gpsd) watch();
@@ -187,6 +191,25 @@ bool Rover::chosen(const Epoch& epoch, const Arrival& at) {
   return true;
 }
 
+/// One epoch that is 10 s and more ahead of all before, or behind the newest, is another receiver's or
+/// damaged; a receiver that sets its clock says so with the next one too. Epochs that waited on the way are
+/// neither.
+bool Rover::is_lone_step(UtcTime measured, const Arrival& at) {
+  const std::int64_t offset_ns = measured.ns - at.steady_ns;
+  const bool ahead = most_ahead_ns_ && offset_ns - *most_ahead_ns_ > k_jump_ns;
+  const bool behind = newest_ && newest_->ns - measured.ns >= k_jump_ns;
+  if (!ahead && !behind) {
+    step_ns_.reset();
+    most_ahead_ns_ = std::max(most_ahead_ns_.value_or(offset_ns), offset_ns);
+    return false;
+  }
+  const auto former = std::exchange(step_ns_, offset_ns);
+  if (!former || std::abs(offset_ns - *former) > k_same_step_ns) return true;
+  step_ns_.reset();
+  most_ahead_ns_ = offset_ns;
+  return false;
+}
+
 void Rover::give_one(const Epoch& epoch, const Arrival& at) {
   if (epoch.fix == FixClass::none) {
     // Its clock runs on a battery, or from the first second of 1980: no time of it counts, only that it is
@@ -200,11 +223,15 @@ void Rover::give_one(const Epoch& epoch, const Arrival& at) {
   if (newest_ && epoch.time->ns <= newest_->ns && newest_->ns - epoch.time->ns < k_jump_ns) {
     return out_.dropped(epoch.time == newest_ ? "repeated_epoch" : "out_of_order");
   }
+  if (is_lone_step(*epoch.time, at)) return out_.dropped("time_step");
   newest_ = epoch.time;
   const auto belief = out_.time().receiver_said(out_.slot(), *epoch.time, at, options_.latency_s);
   out_.notice(out_.time().doubt(out_.slot()).value_or(""));
   out_.rover(status_of(epoch));
-  if (belief != timing::Belief::believed) return out_.dropped("date_not_believed");
+  if (belief != timing::Belief::believed) {
+    most_ahead_ns_.reset();
+    return out_.dropped("date_not_believed");
+  }
   auto fix = to_fix(epoch, MissionId{});
   if (!fix) return out_.dropped("no_ellipsoidal_height");
   if (!plausible(*fix)) return out_.dropped("implausible_position");

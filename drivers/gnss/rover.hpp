@@ -45,6 +45,7 @@ class Rover final : public device::Driver {
   void give(Epochs& epochs, const device::Arrival& now);
   void give_one(const Epoch& epoch, const device::Arrival& at);
   bool chosen(const Epoch& epoch, const device::Arrival& at);
+  bool is_lone_step(UtcTime measured, const device::Arrival& at);
   void count();
 
   RoverOptions options_;
@@ -59,6 +60,8 @@ class Rover final : public device::Driver {
   std::optional<Protocol> speaks_{};
   std::int64_t spoke_ns_{0};
   std::optional<UtcTime> newest_{};
+  std::optional<std::int64_t> most_ahead_ns_{};  ///< UTC of an epoch minus steady clock of its arrival
+  std::optional<std::int64_t> step_ns_{};        ///< the same, of an epoch that nothing confirms yet
   std::optional<std::int64_t> undated_since_ns_{};
   std::uint64_t seq_{0};
   std::optional<device::Identity> identity_{};

@@ -10,16 +10,14 @@
 #include <fstream>
 
 #include "api/application.hpp"
-#include "api/mqtt/topic_name.hpp"
 #include "api/stream/hub.hpp"
 #include "core/base/locked.hpp"
 #include "core/base/text.hpp"
-#include "drivers/drone/signing_key.hpp"
-#include "drivers/link/address.hpp"
 #include "server/app/authenticator.hpp"
 #include "server/app/metrics.hpp"
 #include "server/app/model_key.hpp"
 #include "server/app/standby.hpp"
+#include "server/app/startup.hpp"
 #include "server/config/listeners.hpp"
 #include "server/flight/demonstration_flight.hpp"
 #include "server/flight/drone_link.hpp"
@@ -168,9 +166,6 @@ Result<void> App::State::open_rows(const Waiting& waiting) {
   LeaseWish wish;
   wish.server = worker_name();
   wish.standby = config.flag("standby");
-  if (wish.standby && address.empty())
-    return make_error(Errc::invalid_argument,
-                      "standby: a folder has one server; give --database, which several can reach");
   wish.url = config.text("standby_url");
   wish.stopping = waiting.stopping;
   BOOST_OUTCOME_TRY(const auto standby, Standby::make(config, listeners, proxies));
@@ -271,65 +266,25 @@ Result<void> App::State::open_devices() {
   return boost::outcome_v2::success();
 }
 
-/// Whoever can reach the aircraft's link can fly it, unless frames are signed.
 Result<void> App::State::open_drone() {
-  const auto& address = config.text("drone.address");
-  if (address.empty()) return boost::outcome_v2::success();
-  std::optional<mavlink::Secret> key;
-  if (const auto& file = config.text("drone.signing_key_file"); !file.empty()) {
-    auto read = drone::read_signing_key(file);
-    if (!read) return make_error(read.error().code, "drone.signing_key_file: " + read.error().message);
-    key = read.value();
-  }
-  auto where = link::parse_address(address);
-  if (!where) return make_error(where.error().code, "drone.address: " + where.error().message);
-  if (link::others_may_reach(where.value()) && !key && !config.flag("insecure")) {
-    return make_error(Errc::invalid_argument,
-                      "drone.address " + address +
-                          " can be reached from other machines, which could fly the aircraft; give "
-                          "--drone-signing-key-file (MAVLink 2 signing), or accept this with --insecure");
-  }
+  BOOST_OUTCOME_TRY(const auto end, drone_end(config));
+  if (!end) return boost::outcome_v2::success();
   auto opened = flight::DroneLink::open(
-      address,
+      end->address,
       [](std::string_view what) {
         log(LogLevel::warning, "drone", {{"what", what}});
       },
-      key);
+      end->key);
   if (!opened) return make_error(opened.error().code, "drone.address: " + opened.error().message);
   drone = std::move(opened).value();
   return boost::outcome_v2::success();
 }
 
-/// A password must not pass a network that others may be on in the clear.
 Result<void> App::State::open_broker() {
-  const auto bad = [](std::string_view key, const std::string& why) {
-    return make_error(Errc::invalid_argument, std::string(key) + ": " + why);
-  };
-  MqttOptions options;
-  options.host = config.text("mqtt.host");
-  if (options.host.empty()) return boost::outcome_v2::success();
-  const auto port = config.count("mqtt.port");
-  if (port > 65'535) return bad("mqtt.port", std::to_string(port) + " is above 65535");
-  options.port = static_cast<std::uint16_t>(port);
-  if (const auto wrong = api::wrong_prefix(config.text("mqtt.prefix")); !wrong.empty())
-    return bad("mqtt.prefix", wrong);
-  options.ca_file = config.text("mqtt.ca_file");
-  options.user = config.text("mqtt.user");
-  if (const auto& file = config.text("mqtt.password_file"); !file.empty()) {
-    if (options.user.empty()) return bad("mqtt.password_file", "a password needs mqtt.user");
-    auto password = read_mqtt_password(file);
-    if (!password) return bad("mqtt.password_file", password.error().message);
-    options.password = std::move(password).value();
-    const bool v6 = options.host.find(':') != std::string::npos;
-    const auto local =
-        is_loopback((v6 ? '[' + options.host + ']' : options.host) + ':' + std::to_string(port));
-    if (options.ca_file.empty() && !(local && local.value()) && !config.flag("insecure"))
-      return bad("mqtt.password_file",
-                 "the password would go to " + options.host +
-                     " unencrypted; set mqtt.ca_file (TLS), or accept this with --insecure");
-  }
-  auto opened = make_mqtt_broker(std::move(options));
-  if (!opened) return bad("mqtt.ca_file", opened.error().message);
+  BOOST_OUTCOME_TRY(auto options, mqtt_options(config));
+  if (!options) return boost::outcome_v2::success();
+  auto opened = make_mqtt_broker(*std::move(options));
+  if (!opened) return make_error(Errc::invalid_argument, "mqtt.ca_file: " + opened.error().message);
   broker = std::move(opened).value();
   return boost::outcome_v2::success();
 }
@@ -372,6 +327,8 @@ std::vector<api::AlarmCondition> App::State::alarms() const {
                    std::nullopt});
   if (auto ids = devices->too_many_ids(); !ids.empty())
     out.push_back({"devices.ids", api::AlarmPriority::warning, std::move(ids), std::nullopt});
+  if (auto moved = devices->moved_bases(); !moved.empty())
+    out.push_back({"rtk.base", api::AlarmPriority::warning, std::move(moved), devices->recording_into()});
   std::error_code unknown;
   const auto space = fs::space(data_dir, unknown);
   if (!unknown && space.available < k_low_disk_bytes)
@@ -435,6 +392,7 @@ void App::State::compose() {
   deps.geopackage = geopackage;
   deps.feature_file = make_geopackage_file;
   deps.print_pdf = print_with_chromium;
+  deps.geoid_dir = config.text("geoid.dir");
   deps.spool_dir = emptied_spool(data_dir);
   web_post = make_web_post(config.flag("webhooks.allow_private"), config.text("webhooks.ca_file"));
   deps.web_post = web_post.get();
@@ -484,8 +442,8 @@ const std::vector<std::string>& App::urls() const { return state_->urls; }
 
 Result<std::unique_ptr<App>> App::start(const Config& config, std::function<std::string()> doctor,
                                         const Waiting& waiting) {
+  BOOST_OUTCOME_TRYV(check_startup(config));  // before anything is made
   BOOST_OUTCOME_TRY(auto listeners, listeners_of(config));
-  BOOST_OUTCOME_TRYV(check_listeners(config, listeners));
   auto state = std::make_unique<State>();
   auto& s = *state;
   s.config = config;

@@ -2,6 +2,7 @@
 #include <cstdio>
 
 #include "core/base/text.hpp"
+#include "server/app/startup.hpp"
 #include "server/cli/commands.hpp"
 #include "server/cli/config_flags.hpp"
 
@@ -28,8 +29,14 @@ void add_config_command(CLI::App& app, int& exit_code) {
   const auto check_flags = add_config_flags(*check);
   check->callback([&exit_code, check_flags] {
     const auto config = loaded(*check_flags);
-    exit_code = config ? 0 : 2;
-    if (config) std::puts("configuration is valid");
+    exit_code = 2;
+    if (!config) return;
+    if (const auto starts = server::check_startup(config.value()); !starts) {
+      std::fprintf(stderr, "the server would not start: %s\n", printable(starts.error().message).c_str());
+      return;
+    }
+    exit_code = 0;
+    std::puts("configuration is valid");
   });
   auto* show = command->add_subcommand("show", "Print every setting, its value and its origin");
   const auto show_flags = add_config_flags(*show);

@@ -236,7 +236,10 @@ void add_simulate_drone(CLI::App& simulate, int& exit_code) {
   auto o = std::make_shared<SimulatedDroneOptions>();
   auto* command = simulate.add_subcommand(
       "drone", "Simulate an aircraft: MAVLink on a socket, its tag and rover as measurements of a mission");
-  command->add_option("--mavlink", o->mavlink, "address where the server expects MAVLink (its drone.address)")
+  command
+      ->add_option(
+          "--mavlink", o->mavlink,
+          "where MAVLink is sent: udp://127.0.0.1:PORT for a server with --drone-address udp://:PORT")
       ->capture_default_str();
   command->add_option("--url", o->url, "of the server")->capture_default_str();
   command->add_option("--token-file", o->token_file, "file with an access token (gateway and operator)");

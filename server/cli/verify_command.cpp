@@ -35,7 +35,7 @@ int verify(const std::string& pack, const std::string& key_file) {
   std::printf("intact: %zu files match the %s\n", v.n_files,
               v.kind == api::PackVerdict::Kind::pack ? "list of checksums" : "manifest");
   if (v.kind == api::PackVerdict::Kind::bundle)
-    std::printf("not signed: only a hand-over pack has a signature, a flight bundle has none\n");
+    std::printf("not signed: only a hand-over pack has a signature, a bundle has none\n");
   else if (v.own_key)
     std::printf(
         "signed with the key in the pack, %s: to prove which server signed, give its key with --key (GET "
@@ -50,7 +50,8 @@ int verify(const std::string& pack, const std::string& key_file) {
 
 void add_verify_command(CLI::App& app, int& exit_code) {
   auto* command = app.add_subcommand(
-      "verify", "Check a hand-over pack or a flight bundle against its checksums and signature");
+      "verify",
+      "Check a hand-over pack, or a bundle of a flight or a site, against its checksums and signature");
   const auto pack = std::make_shared<std::string>();
   const auto key = std::make_shared<std::string>();
   command->add_option("pack", *pack, "file to check")->required();

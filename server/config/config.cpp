@@ -137,6 +137,8 @@ constexpr std::array k_options = {
            "on|off"},
     Option{"solve.max_correction_age_s", "30",
            "RTK fixed with corrections older than this counts as float, live and in calibrations", seconds},
+    Option{"geoid.dir", "",
+           "folder of a geoid model of GeographicLib, for heights above the sea [where GeographicLib looks]"},
     Option{"rate.per_s", "50", "requests per second of one token; beyond it: 429", count},
     Option{"rate.burst", "200", "requests that a token may send at once", count},
 };

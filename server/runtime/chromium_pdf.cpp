@@ -6,6 +6,7 @@
 
 #include <array>
 #include <chrono>
+#include <cstdio>
 #include <string>
 #include <thread>
 #include <vector>
@@ -41,6 +42,45 @@ bool ended_well(pid_t pid) {
   return WIFEXITED(status) && WEXITSTATUS(status) == 0;
 }
 
+/// As the address of a page: of a folder whose path is relative, or has a # or % in it, too.
+std::string file_url(const std::filesystem::path& file) {
+  constexpr std::string_view k_plain = "/-._~";
+  std::string out = "file://";
+  for (const char c : std::filesystem::absolute(file).string()) {
+    const auto byte = static_cast<unsigned char>(c);
+    const bool word =
+        (byte >= '0' && byte <= '9') || (byte >= 'A' && byte <= 'Z') || (byte >= 'a' && byte <= 'z');
+    char coded[4] = {};
+    std::snprintf(coded, sizeof coded, "%%%02X", byte);
+    out += word || k_plain.find(c) != std::string_view::npos ? std::string(1, c) : std::string(coded);
+  }
+  return out;
+}
+
+bool print(const std::string& program, const std::filesystem::path& html, const std::filesystem::path& pdf,
+           bool sandboxed) {
+  const auto profile = pdf.parent_path() / "chromium";
+  std::vector<std::string> words{program,
+                                 "--headless",
+                                 "--disable-gpu",
+                                 "--disable-dev-shm-usage",
+                                 "--disable-background-networking",
+                                 "--host-resolver-rules=MAP * ~NOTFOUND",
+                                 "--user-data-dir=" + std::filesystem::absolute(profile).string(),
+                                 "--no-pdf-header-footer",
+                                 "--print-to-pdf=" + std::filesystem::absolute(pdf).string()};
+  if (!sandboxed) words.emplace_back("--no-sandbox");
+  words.push_back(file_url(html));
+  const auto pid = start_program({.program = program,
+                                  .arguments = std::move(words),
+                                  .environment = {"PATH=/usr/bin:/bin"},
+                                  .own_group = true});
+  const bool well = pid && ended_well(pid.value());
+  std::error_code gone;
+  std::filesystem::remove_all(profile, gone);
+  return well && std::filesystem::file_size(pdf, gone) > 0 && !gone;
+}
+
 }  // namespace
 
 Result<void> print_with_chromium(const std::filesystem::path& html, const std::filesystem::path& pdf) {
@@ -49,27 +89,11 @@ Result<void> print_with_chromium(const std::filesystem::path& html, const std::f
     return make_error(Errc::unsupported,
                       "the server prints it with Chromium, which is not installed (Debian: chromium); every "
                       "browser prints report.html");
-  const auto profile = pdf.parent_path() / "chromium";
-  std::vector<std::string> words{program,
-                                 "--headless",
-                                 "--disable-gpu",
-                                 "--disable-dev-shm-usage",
-                                 "--disable-background-networking",
-                                 "--host-resolver-rules=MAP * ~NOTFOUND",
-                                 "--user-data-dir=" + profile.string(),
-                                 "--no-pdf-header-footer",
-                                 "--print-to-pdf=" + pdf.string()};
-  // Chromium's own sandbox does not start for root; the page is ours, and has no script.
-  if (::geteuid() == 0) words.emplace_back("--no-sandbox");
-  words.push_back("file://" + html.string());
-  const auto pid = start_program({.program = program,
-                                  .arguments = std::move(words),
-                                  .environment = {"PATH=/usr/bin:/bin"},
-                                  .own_group = true});
-  const bool well = pid && ended_well(pid.value());
-  std::error_code gone;
-  std::filesystem::remove_all(profile, gone);
-  if (well && std::filesystem::file_size(pdf, gone) > 0 && !gone) return boost::outcome_v2::success();
+  // Chromium's own sandbox starts neither for root nor in a service that may make no namespaces
+  // (RestrictNamespaces=); the page is ours, and has no script.
+  const bool sandboxed = ::geteuid() != 0;
+  if (print(program, html, pdf, sandboxed) || (sandboxed && print(program, html, pdf, false)))
+    return boost::outcome_v2::success();
   return make_error(Errc::internal,
                     program + " of the server did not print it; every browser prints report.html");
 }

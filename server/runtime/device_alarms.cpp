@@ -6,13 +6,27 @@
 
 namespace anchord::server {
 
-std::string too_many_ids(const std::vector<device::DeviceState>& devices) {
+namespace {
+
+/// Each device of which something is said, with what is said.
+std::string by_device(const std::vector<device::DeviceState>& devices,
+                      std::string device::DeviceState::*said) {
   std::string out;
   for (const auto& s : devices) {
-    if (s.too_many_ids.empty()) continue;
-    out += (out.empty() ? "device \"" : "; device \"") + s.settings.name + "\": " + s.too_many_ids;
+    if ((s.*said).empty()) continue;
+    out += (out.empty() ? "device \"" : "; device \"") + s.settings.name + "\": " + s.*said;
   }
   return out;
+}
+
+}  // namespace
+
+std::string too_many_ids(const std::vector<device::DeviceState>& devices) {
+  return by_device(devices, &device::DeviceState::too_many_ids);
+}
+
+std::string moved_bases(const std::vector<device::DeviceState>& devices) {
+  return by_device(devices, &device::DeviceState::moved_base);
 }
 
 std::string recordings_on_disk(const std::filesystem::path& folder,

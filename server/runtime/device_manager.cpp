@@ -67,6 +67,21 @@ DeviceReport report_of(const DeviceConfig& config, const device::DeviceState& s)
 
 }  // namespace
 
+Result<DeviceConfig> parse_device_setting(const std::string& text) {
+  const auto equals = text.find('=');
+  if (!is_utf8(text))
+    return make_error(Errc::invalid_argument, "devices: \"" + to_utf8(text) + "\" is not UTF-8");
+  if (equals == std::string::npos)
+    return make_error(Errc::invalid_argument, "devices: \"" + text + "\" is not kind=address");
+  DeviceConfig config;
+  config.kind = text.substr(0, equals);
+  config.address = text.substr(equals + 1);
+  config.name = config.kind;
+  if (const auto address = link::parse_address(config.address); !address)
+    return make_error(address.error().code, "devices: " + address.error().message);
+  return config;
+}
+
 class DeviceManager::Impl final : public device::DeviceListener {
  public:
   explicit Impl(DeviceManagerOptions options)
@@ -85,17 +100,7 @@ class DeviceManager::Impl final : public device::DeviceListener {
     auto kept = read_devices(file());
     auto& devices = kept.devices;
     for (const auto& text : options_.from_config) {
-      const auto equals = text.find('=');
-      if (!is_utf8(text))
-        return make_error(Errc::invalid_argument, "devices: \"" + to_utf8(text) + "\" is not UTF-8");
-      if (equals == std::string::npos) {
-        return make_error(Errc::invalid_argument, "devices: \"" + text + "\" is not kind=address");
-      }
-      DeviceConfig config;
-      config.kind = text.substr(0, equals);
-      config.address = text.substr(equals + 1);
-      config.name = config.kind;
-      BOOST_OUTCOME_TRYV(link::parse_address(config.address));
+      BOOST_OUTCOME_TRY(auto config, parse_device_setting(text));
       const bool known = std::any_of(devices.begin(), devices.end(),
                                      [&](const auto& d) { return d.config.address == config.address; });
       if (known) continue;
@@ -575,6 +580,7 @@ std::string DeviceManager::not_started() { return impl_->not_started(); }
 std::uint64_t DeviceManager::rows_lost() { return impl_->unstored_.dropped(); }
 
 std::string DeviceManager::too_many_ids() { return server::too_many_ids(impl_->states()); }
+std::string DeviceManager::moved_bases() { return server::moved_bases(impl_->states()); }
 std::string DeviceManager::recordings_on_disk() {
   return server::recordings_on_disk(impl_->recordings(), impl_->states());
 }

@@ -10,6 +10,9 @@
 
 namespace anchord::server {
 
+/// "kind=address" of the setting devices, without an id. errors: invalid_argument
+Result<DeviceConfig> parse_device_setting(const std::string& text);
+
 struct DeviceManagerOptions {
   std::filesystem::path data_dir;         ///< devices.json and recordings/ are in it
   std::vector<std::string> from_config;   ///< "kind=address"; added when no device has the address
@@ -52,6 +55,8 @@ class DeviceManager final : public DeviceControl {
   std::uint64_t rows_lost();
   /// Devices that send more ids than a flight follows, one line; empty: none.
   std::string too_many_ids();
+  /// Devices whose base of corrections moved or changed in this flight, one line; empty: none.
+  std::string moved_bases();
   /// What the raw recordings take of the disk, where they are and which device writes most of them, one line;
   /// empty: nothing worth moving.
   std::string recordings_on_disk();

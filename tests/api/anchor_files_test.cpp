@@ -95,6 +95,22 @@ TEST_F(AnchorFiles, IfcHasTextOfItsNotationAndTheGlobalIdsOfTheBuilding) {
   EXPECT_EQ(file("ifc").body, got.body) << "the same anchors, the same file";
 }
 
+TEST_F(AnchorFiles, OfASiteAreRefusedWhereItsAnchorsMayBeThoseInNoSiteWhichSaySo) {
+  publish(false);
+  const auto site = json(get("/api/v1/sites"))["items"][0]["id"].get<std::string>();
+  for (const char* format : {"dxf", "ifc", "pnezd", "pozyx"}) {
+    const auto got = file(format, {{"site", site}});
+    EXPECT_EQ(got.status, 422) << format;
+    EXPECT_NE(got.body.find("no published anchor is of this site, and 0x6a2f, 0x6a3c are in no site"),
+              std::string::npos)
+        << got.body;
+  }
+  const auto got = file("dxf");
+  EXPECT_EQ(got.status, 422);
+  EXPECT_NE(got.body.find("the anchor is in no site: PATCH /anchors/{id} with its site"), std::string::npos)
+      << got.body;
+}
+
 // A model that joins the files of two servers would take two projects of one GlobalId for one.
 TEST_F(AnchorFiles, IfcProjectsOfTwoSitesOfOneNameHaveTheirOwnGlobalIds) {
   publish(true);

@@ -1,5 +1,7 @@
 // What a calibration may be asked for, each shown to have an effect: the likelihood of a model, stated noise,
 // starts, a local frame, ranges between anchors, the site's outline.
+#include <set>
+
 #include "api/calibration/calibration_service.hpp"
 #include "app_fixture.hpp"
 #include "core/geo/enu.hpp"
@@ -58,13 +60,15 @@ class Calibrations : public AppFixture {
     return m;
   }
   /// The flight in the store; its mission.
-  std::string flown(const MadeFlight& m, double blocked_share = 0, const std::string& site = "") {
+  std::string flown(const MadeFlight& m, double blocked_share = 0, const std::string& site = "",
+                    const std::string& kit = "") {
     FlightData data = anchord::testing::make_flight(m);
     std::mt19937_64 random(m.seed + 100);
     std::uniform_real_distribution<double> uniform(0, 1);
     Mission mission = data.mission;
     mission.id.uuid = make_uuid_v7(clock_.now());
     mission.created = clock_.now();
+    if (!kit.empty()) mission.kit = kit;
     if (!site.empty()) mission.site = SiteId{parse_uuid(site).value()};
     EXPECT_TRUE(database_->stores().missions.insert(mission).has_value());
     for (auto& fix : data.fixes) fix.mission = mission.id;
@@ -82,16 +86,22 @@ class Calibrations : public AppFixture {
     EXPECT_TRUE(database_->stores().measurements.append_ranges(data.ranges, true).has_value());
     return to_string(mission.id);
   }
-  api::Response solve(const std::string& mission, Json more = Json::object()) {
-    more["missions"] = {mission};
+  api::Response solve(const std::vector<std::string>& missions, Json more = Json::object()) {
+    more["missions"] = missions;
     Call options;
     options.headers["prefer"] = "wait=120";
     return call(Method::post, "/api/v1/calibrations", more.dump(), options);
   }
-  Json solved(const std::string& mission, const Json& more = Json::object()) {
-    const auto response = solve(mission, more);
+  Json solved(const std::vector<std::string>& missions, const Json& more = Json::object()) {
+    const auto response = solve(missions, more);
     EXPECT_EQ(response.status, 201) << response.body;
     return json(response);
+  }
+  Json solved(const std::string& mission, const Json& more = Json::object()) {
+    return solved(std::vector{mission}, more);
+  }
+  api::Response solve(const std::string& mission, const Json& more = Json::object()) {
+    return solve(std::vector{mission}, more);
   }
   /// Mean distance of the anchors from where they are.
   static double error_m(const Json& calibration, const MadeFlight& m) {
@@ -245,6 +255,53 @@ TEST_F(Calibrations, BeginWhereBearingAndHeightMeet) {
     EXPECT_GT(up_m(high) - up_m(low), 2.0) << i;
     EXPECT_NEAR(up_m(searched), up_m(searched_high), 1.0) << "the priors alone decide nothing";
   }
+}
+
+TEST_F(Calibrations, CountAFlightOnceThatIsThereTwiceOfTheSameKitOrAnother) {
+  const auto first = flown(made(31)), again = flown(made(31)),
+             renamed = flown(made(31), 0, "", "another kit"), second = flown(made(32));
+  const auto h95_m = [](const Json& calibration) {
+    std::vector<double> out;
+    for (const auto& anchor : calibration["anchors"])
+      out.push_back(anchor["accuracy"]["relative"]["h95_m"].get<double>());
+    return out;
+  };
+  const auto alone = h95_m(solved(first));
+  const auto copies = solved({first, again, renamed}), two = solved({first, second});
+  ASSERT_EQ(h95_m(copies).size(), alone.size());
+  for (std::size_t i = 0; i < alone.size(); ++i) {
+    EXPECT_NEAR(h95_m(copies)[i], alone[i], 1e-6) << "copies are no measurements";
+    EXPECT_LT(h95_m(two)[i], 0.9 * alone[i]) << "another flight is";
+  }
+  const auto& flights = copies["provenance"]["flights"];
+  EXPECT_EQ(flights[0]["copy_of"], nullptr);
+  EXPECT_EQ(flights[1]["copy_of"], first);
+  EXPECT_EQ(flights[2]["copy_of"], first);
+}
+
+TEST_F(Calibrations, PublishedBringAnchorsWithoutASiteIntoThatOfTheFlightsAndNameThoseOfAnother) {
+  const auto hall = site(square(40)), other = site(square(40));
+  const auto publish = [&](const Json& calibration) {
+    const auto done = post("/api/v1/calibrations/" + calibration["id"].get<std::string>() + "/publish", "{}");
+    EXPECT_EQ(done.status, 201) << done.body;
+    return json(done);
+  };
+  const auto sites_of = [&] {
+    std::set<std::string> out;
+    const auto all = json(get("/api/v1/anchors"));
+    for (const auto& feature : all["features"])
+      out.insert(feature["properties"]["site"].is_null() ? "none"
+                                                         : feature["properties"]["site"].get<std::string>());
+    return out;
+  };
+  EXPECT_EQ(publish(solved(flown(made(41))))["of_other_sites"], Json::array());
+  EXPECT_EQ(sites_of(), std::set<std::string>{"none"}) << "the flight had no site";
+  EXPECT_EQ(publish(solved(flown(made(42), 0, hall)))["of_other_sites"], Json::array());
+  EXPECT_EQ(sites_of(), std::set<std::string>{hall});
+  const auto again = publish(solved(flown(made(43), 0, other)));
+  EXPECT_EQ(sites_of(), std::set<std::string>{hall}) << "nothing is taken away";
+  ASSERT_EQ(again["of_other_sites"].size(), again["anchors"].size());
+  EXPECT_EQ(again["of_other_sites"][0]["site"], hall);
 }
 
 TEST_F(Calibrations, TellTheirAnswerInALocalFrameToo) {

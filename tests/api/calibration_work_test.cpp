@@ -235,6 +235,9 @@ TEST_F(StrangeAnswer, IsRefusedWithMoreThanCanBe) {
   answer.flights.push_back(answer.flights[0]);
   EXPECT_THAT(refusal(answer), HasSubstr("2 flights, and 1 were asked"));
   answer = good();
+  answer.flights[0].copy_of = 0;
+  EXPECT_THAT(refusal(answer), HasSubstr("is a copy of one that does not count"));
+  answer = good();
   answer.flights[0].evidence.residuals.begin()->second.resize(501);
   EXPECT_THAT(refusal(answer), HasSubstr("501 of them, and at most 500"));
   answer = good();

@@ -90,6 +90,20 @@ TEST_F(Flights, StartsHoldsResumesAndLands) {
   EXPECT_EQ(act("return", lease).status, 422) << "nothing flies any more";
 }
 
+TEST_F(Flights, AbortedInTheAirAreFinishedByNobodyElseBeforeTheyHaveLanded) {
+  const auto lease = take_off();
+  fly(3);
+  ASSERT_EQ(act("abort", lease).status, 202);
+  fly(3);
+  ASSERT_EQ(procedure()["status"], "aborted");
+  ASSERT_TRUE(drone_->session.status().in_air);
+  EXPECT_EQ(post(base() + "/actions", R"({"action":"finish"})").status, 409);
+  ASSERT_EQ(act("land", lease).status, 202);
+  ASSERT_TRUE(fly_until([&] { return !drone_->session.status().in_air; }, 60));
+  fly(1);
+  EXPECT_EQ(post(base() + "/actions", R"({"action":"finish"})").status, 200);
+}
+
 TEST_F(Flights, KeepWhatTheirProcedureShowedOfEveryStep) {
   const auto lease = take_off();
   ASSERT_TRUE(fly_until([&] { return procedure()["step"] == "search_anchors"; }, 60));

@@ -85,6 +85,9 @@ TEST_F(Bundles, OfASiteBringItsFlightsAndWhatNoFlightUsed) {
   const Json left_out = json_of(content(entries, "manifest.json"))["left_out"];
   ASSERT_EQ(left_out.size(), 1u);
   EXPECT_EQ(left_out[0]["mission"], to_string(recording.id));
+  const auto file = dir_ / "site.anchord";
+  std::ofstream(file, std::ios::binary) << bytes;
+  EXPECT_TRUE(api::verify_pack(file, std::nullopt).value().faults.empty()) << "it is whole";
 
   const auto again = other.take(bytes);
   EXPECT_EQ(again.status, 200) << again.body;

@@ -4,8 +4,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <random>
 
 #include "core/geo/tag_track.hpp"
+#include "core/localize/flight_copies.hpp"
 #include "core/localize/flight_digest.hpp"
 #include "core/localize/flight_solver.hpp"
 #include "tests/core/localize/flight_support.hpp"
@@ -216,6 +218,47 @@ TEST(KitProfile, CountsAFlightGivenTwiceOnceAndKeepsANamesake) {
   const auto other = solve_flight(namesake, {.profile = profile}).value();
   EXPECT_TRUE(std::ranges::any_of(
       other.notes, [](const std::string& n) { return n.find("of kit 'another'") != std::string::npos; }));
+}
+
+TEST(FlightCopies, AreFlightsWithMostOfTheSameRangesWhateverTheirTrackAndTheLargestOneCounts) {
+  MadeFlight made;
+  const FlightData whole = make_flight(made);
+  FlightData part = whole, half = whole, track = whole;
+  part.ranges.resize(whole.ranges.size() * 3 / 5);
+  std::ranges::reverse(part.ranges);
+  for (auto& fix : track.fixes) fix.position.height_m += 0.2;
+  for (std::size_t i = half.ranges.size() / 3; i < half.ranges.size(); ++i)
+    half.ranges[i].distance_m += 0.004;
+  FlightData later = whole;
+  for (auto& range : later.ranges) range.time.ns += 86'400'123'456'789'000;
+  for (auto& fix : later.fixes) fix.time.ns += 86'400'123'456'789'000;
+  EXPECT_EQ(flight_digest(later), flight_digest(whole)) << "played again";
+  EXPECT_NE(dated_flight_digest(later), dated_flight_digest(whole));
+  FlightData corrected = whole;
+  for (auto& range : corrected.ranges) {
+    corrected.received_m.push_back(range.distance_m);
+    range.distance_m -= 0.1;
+  }
+  made.seed = 2;
+  const FlightData other = make_flight(made);
+  using Copies = std::vector<std::optional<std::size_t>>;
+  const auto of = [](std::vector<const FlightData*> flights) { return flight_copies(flights); };
+  EXPECT_EQ(of({&part, &whole, &other}), (Copies{1, std::nullopt, std::nullopt}));
+  EXPECT_EQ(of({&whole, &track, &corrected, &later}), (Copies{std::nullopt, 0, 0, 0}));
+  EXPECT_EQ(of({&whole, &half}), (Copies{std::nullopt, std::nullopt})) << "most of them are its own";
+  // A tag that stands still, and distances to the centimetre: other flights there are no copies.
+  std::mt19937_64 random(5);
+  std::normal_distribution<double> noise(4.0, 0.02);
+  std::vector<FlightData> still(4);
+  for (auto& flight : still)
+    for (int i = 0; i < 3000; ++i) {
+      Range range;
+      range.anchor = NetworkId{0x6a30};
+      range.time.ns = i * 100'000'000;
+      range.distance_m = std::round(noise(random) * 100) / 100;
+      flight.ranges.push_back(range);
+    }
+  EXPECT_EQ(of({still.data(), &still[1], &still[2], &still[3]}), Copies(4));
 }
 
 }  // namespace

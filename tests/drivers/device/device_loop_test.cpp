@@ -334,6 +334,57 @@ TEST(DeviceLoop, OfNoiseASampleIsRecordedAndEverythingFromTheNextFrameOn) {
   }
 }
 
+TEST(DeviceLoop, ATagWhoseClockIsNotSetIsSaidToBeThatAndNoBrokenLine) {
+  boost::asio::io_context io;
+  Listener listener;
+  auto options = quick();
+  options.supervisor.silent_after_ns = 50'000'000;
+  DeviceLoop loop(io, nullptr, listener, options);
+  Cable cable(temporary("mapped"));
+  cable.plug();
+  ASSERT_TRUE(loop.add({"t", "ndjson", "tag", "serial:" + cable.path,
+                        R"({"mapping":{"tag":"/tag","anchor":"/a","distance":{"pointer":"/d","unit":"m"},)"
+                        R"("time":{"pointer":"/t","unit":"s"}}})"}));
+  ASSERT_TRUE(run_until(io, [&] { return loop.device("t")->phase == Phase::open; }));
+  cable.say(R"({"tag":"0x6a21","a":"0x6a30","d":5.1,"t":1000})"
+            "\n");
+  ASSERT_TRUE(run_until(io, [&] { return loop.device("t")->phase == Phase::silent; }));
+  EXPECT_EQ(loop.device("t")->reason,
+            "messages are received, but none of them can be used, most of them for time_off: correct the "
+            "mapping, or what the device sends");
+}
+
+TEST(BaseWatch, ABaseThatMovesOrIsAnotherInAFlightIsToldOfUntilTheFlightEnds) {
+  const BaseStation first{7, {4'000'000, 300'000, 4'900'000}, {}};
+  auto moved = first, other = first;
+  moved.ecef_m[0] += 3;
+  moved.ecef_m[2] -= 4;
+  other.station = 8;
+  other.ecef_m[1] += 12'300;
+  BaseWatch watch;
+  watch.note(first);
+  watch.note(moved);
+  EXPECT_EQ(watch.trouble(), "") << "before a flight nothing is lost by it";
+  watch.flight(true);
+  watch.note(moved);
+  EXPECT_EQ(watch.trouble(), "");
+  watch.note(first);
+  const std::string said =
+      "base station 7 moved by 5.00 m in this flight: positions before and after differ by as much; give the "
+      "base its known position and fly again";
+  EXPECT_EQ(watch.trouble(), said);
+  watch.note(moved);
+  EXPECT_EQ(watch.trouble(), said) << "the rows between stay wrong";
+  watch.flight(false);
+  EXPECT_EQ(watch.trouble(), "");
+  watch.note(first);
+  watch.flight(true);
+  watch.note(other);
+  EXPECT_EQ(watch.trouble(),
+            "corrections came from base station 7 at first, then from 8, 12 km away: positions before and "
+            "after agree only if both are of one network; if not, fly again");
+}
+
 TEST(DeviceIds, ADeviceThatInventsThemIsToldAboutAndTakesNoMemory) {
   SentIds ids;
   Range range;

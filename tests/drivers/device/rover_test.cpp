@@ -187,6 +187,42 @@ TEST(Rover, WithAWeekRolloverItsPositionsAreNotUsedAndItSaysWhy) {
   EXPECT_EQ(rover.sink.notices[1], "");
 }
 
+TEST(Rover, AnEpochAnHourOffIsNoFixUnlessTheNextOneSaysTheSameAndTakesNoOtherWithIt) {
+  OneRover rover;
+  const auto at = [](int hour, int second) {
+    char text[160];
+    std::snprintf(text, sizeof text,
+                  "GNGGA,%02d00%02d.00,5101.3687380,N,00342.6274020,E,4,14,0.9,22.500,M,45.012,M,0.8,0000",
+                  hour, second);
+    return test::sentence(text);
+  };
+  const auto second = [&](int s, const std::string& bytes) {
+    rover.take(EventKind::bytes, s * k_s + 80 * k_ms, bytes);
+    rover.settle();
+  };
+  second(0, rmc(0) + at(10, 0));
+  second(1, at(10, 1) + at(11, 1));
+  second(2, at(10, 2) + at(9, 2));
+  second(3, at(10, 3));
+  for (int s = 4; s < 8; ++s) second(s, at(11, s));
+  std::vector<std::int64_t> times_s;
+  for (const auto& fix : rover.sink.fixes) times_s.push_back((fix.time.ns - k_epoch) / k_s);
+  EXPECT_EQ(times_s, (std::vector<std::int64_t>{0, 1, 2, 3, 3605, 3606, 3607}));
+  EXPECT_EQ(rover.sink.drops["time_step"], 3U);
+}
+
+TEST(Rover, EpochsThatWaitedOnTheWayAreAllTaken) {
+  OneRover rover;
+  rover.take(EventKind::bytes, 80 * k_ms, rmc(0) + gga(0));
+  rover.settle();
+  for (int s = 1; s <= 30; ++s) rover.take(EventKind::bytes, 30 * k_s + s * k_ms, gga(s));
+  rover.settle();
+  rover.take(EventKind::bytes, 31 * k_s + 80 * k_ms, gga(31));
+  rover.settle();
+  EXPECT_EQ(rover.sink.fixes.size(), 32U);
+  EXPECT_EQ(rover.sink.drops["time_step"], 0U);
+}
+
 TEST(Rover, RefusesOptionsItDoesNotKnow) {
   Collect sink;
   device::Pipeline pipeline(sink);

@@ -30,6 +30,17 @@ class Pair {
       for (auto& r : session.take_reports()) reports.push_back(std::move(r));
     }
   }
+  /// Nothing is heard, and nobody hears; the autopilot goes on.
+  void silence(double seconds) {
+    for (const double end = now + seconds; now < end;) {
+      now += 0.05;
+      autopilot.advance(now);
+      (void)autopilot.take_bytes();
+      session.tick(now, k_unix_us + static_cast<std::int64_t>(now * 1e6));
+      (void)session.take_bytes();
+      for (auto& r : session.take_reports()) reports.push_back(std::move(r));
+    }
+  }
   template <class Done>
   bool run_until(Done done, double seconds) {
     for (const double end = now + seconds; now < end;) {
@@ -201,6 +212,69 @@ TEST(DroneSession, AnAutopilotWithoutFencesSaysSo) {
   const auto number = pair.session.upload_fence({k_fence, {}});
   ASSERT_TRUE(pair.run_until([&] { return pair.last(number) == CommandState::refused; }, 10));
   EXPECT_NE(pair.words(number).find("does not support"), std::string::npos) << pair.words(number);
+}
+
+TEST(DroneSession, AListThatAnotherGroundStationReplacesIsNoLongerConfirmed) {
+  Pair pair;
+  pair.run(3);
+  const auto number = pair.session.upload_fence({k_fence, {}});
+  ASSERT_TRUE(pair.run_until([&] { return pair.last(number) == CommandState::accepted; }, 20));
+  mavlink::Packer autopilot{{1, 1}};
+  const auto tell = [&](int system, int type, int list) {
+    const auto ack = mavlink::Message("MISSION_ACK")
+                         .set("target_system", system)
+                         .set("target_component", 190)
+                         .set("type", type)
+                         .set("mission_type", list);
+    pair.session.feed(pair.now, k_unix_us, autopilot.pack(ack));
+    pair.run(0.1);
+  };
+  tell(254, 14, 1);
+  EXPECT_EQ(pair.last(number), CommandState::accepted) << "it was denied";
+  tell(254, 0, 0);
+  EXPECT_EQ(pair.last(number), CommandState::accepted) << "a mission, not the fence";
+  tell(254, 0, 1);
+  EXPECT_EQ(pair.last(number), CommandState::unconfirmed);
+  EXPECT_EQ(pair.words(number),
+            "another ground station (system 254) has replaced the fence in the autopilot since");
+}
+
+TEST_P(EachAutopilot, AfterARestartOrALongSilenceOnTheGroundTheFenceIsNotKnownToBeThere) {
+  for (const bool restart : {true, false}) {
+    Pair pair(options());
+    pair.run(6);
+    const auto number = pair.session.upload_fence({k_fence, {}});
+    ASSERT_TRUE(pair.run_until([&] { return pair.last(number) == CommandState::accepted; }, 20));
+    if (restart) {
+      ASSERT_TRUE(pair.autopilot.restart());
+      pair.run(12);
+    } else {
+      pair.silence(14);
+      pair.run(1.5);
+    }
+    EXPECT_EQ(pair.last(number), CommandState::unconfirmed) << restart;
+    EXPECT_NE(pair.words(number).find(restart ? "restarted since" : "may be another one"), std::string::npos)
+        << pair.words(number);
+  }
+}
+
+TEST(DroneSession, AnAutopilotThatAsksForOneItemForEverEndsTheTransfer) {
+  Pair pair;
+  pair.run(3);
+  pair.link_down = true;  // what is heard from here on is written by hand
+  const auto number = pair.session.upload_fence({k_fence, {}});
+  mavlink::Packer autopilot{{1, 1}};
+  for (int i = 0; i < 40 && pair.last(number) == CommandState::sent; ++i) {
+    pair.session.feed(pair.now, k_unix_us,
+                      autopilot.pack(mavlink::Message("MISSION_REQUEST_INT")
+                                         .set("target_system", 255)
+                                         .set("seq", 1)
+                                         .set("mission_type", 1)));
+    pair.run(0.5);
+  }
+  EXPECT_EQ(pair.last(number), CommandState::unconfirmed);
+  EXPECT_EQ(pair.words(number).rfind("the autopilot asks for item 1 again and again", 0), 0U)
+      << pair.words(number);
 }
 
 TEST(DroneSession, AListWithoutAnAnswerIsNotConfirmed) {

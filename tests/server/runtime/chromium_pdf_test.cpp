@@ -34,6 +34,20 @@ TEST(ChromiumPdf, PrintsAPageOfItsOwnAndLeavesNothingElse) {
   EXPECT_EQ(n, 2u) << "its profile is gone";
 }
 
+TEST(ChromiumPdf, PrintsInAFolderOfARelativePathWithSignsThatAddressesReadOtherwise) {
+  if (::access("/usr/bin/chromium", X_OK) != 0)
+    GTEST_SKIP() << "NOT TESTED: Debian package chromium is not installed";
+  const ScratchDir dir;
+  const auto folder = dir.path() / "50% of #2?";
+  std::filesystem::create_directory(folder);
+  std::ofstream(folder / "report.html") << "<!doctype html><meta charset=utf-8><h1>Hall</h1>";
+  const auto relative = std::filesystem::proximate(folder);
+  ASSERT_TRUE(relative.is_relative());
+  const auto printed = print_with_chromium(relative / "report.html", relative / "report.pdf");
+  ASSERT_TRUE(printed) << printed.error().message;
+  EXPECT_TRUE(content(folder / "report.pdf").starts_with("%PDF-"));
+}
+
 TEST(ChromiumPdf, SaysThatThereIsNoPage) {
   if (::access("/usr/bin/chromium", X_OK) != 0)
     GTEST_SKIP() << "NOT TESTED: Debian package chromium is not installed";

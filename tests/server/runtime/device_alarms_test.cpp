@@ -27,7 +27,7 @@ TEST(DeviceAlarms, RecordingsThatFillTheDiskNameTheirFolderAndTheDeviceThatWrite
   EXPECT_EQ(recordings_on_disk(dir.path() / "none", devices), "");
 }
 
-TEST(DeviceAlarms, EachDeviceThatSendsTooManyIdsIsNamed) {
+TEST(DeviceAlarms, EachDeviceThatSendsTooManyIdsOrWhoseBaseMovedIsNamed) {
   std::vector<device::DeviceState> devices(3);
   for (const char* name : {"a", "b", "c"})
     devices[static_cast<std::size_t>(*name - 'a')].settings.name = name;
@@ -35,6 +35,9 @@ TEST(DeviceAlarms, EachDeviceThatSendsTooManyIdsIsNamed) {
   devices[1].too_many_ids = "it sends many";
   devices[2].too_many_ids = "it sends more";
   EXPECT_EQ(too_many_ids(devices), "device \"b\": it sends many; device \"c\": it sends more");
+  EXPECT_EQ(moved_bases(devices), "");
+  devices[0].moved_base = "its base moved";
+  EXPECT_EQ(moved_bases(devices), "device \"a\": its base moved");
 }
 
 }  // namespace

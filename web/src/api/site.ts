@@ -16,9 +16,11 @@ export interface Datum {
   readonly epoch: number | null;
   readonly source: BaseSource;
   readonly sigma_m: number | null;
+  /// Of the map that drawings and survey files are in; null: none.
+  readonly projected_epsg: number | null;
 }
 
-export function site_of({ id, name, origin, crs }: Wire<'Site'>): Site {
+export function site_of({ id, name, origin, crs, projected_epsg }: Wire<'Site'>): Site {
   const { frame, epoch, base } = crs,
     known = (['known_point', 'survey_in', 'network'] as const).find((s) => s === base?.source);
   return {
@@ -29,6 +31,7 @@ export function site_of({ id, name, origin, crs }: Wire<'Site'>): Site {
     epoch: epoch ?? null,
     source: known ?? '',
     sigma_m: base?.sigma_m ?? null,
+    projected_epsg: projected_epsg ?? null,
   };
 }
 export const sites = async (): Promise<Site[]> => (await list('/sites', { query: { limit: 100 } })).map(site_of);
@@ -42,12 +45,15 @@ export async function change_site(id: string, d: Datum): Promise<void> {
   const { etag } = await call('get', '/sites/{id}', { path: { id } });
   await call('patch', '/sites/{id}', {
     path: { id },
-    body: { crs: crs_of(d) },
+    body: { crs: crs_of(d), projected_epsg: d.projected_epsg },
     headers: { 'If-Match': etag, 'Content-Type': 'application/merge-patch+json' },
   });
 }
 export const create_site = (name: string, d: Datum): Promise<unknown> =>
-  call('post', '/sites', { body: { name, crs: crs_of(d) }, headers: { 'Idempotency-Key': idempotency_key() } });
+  call('post', '/sites', {
+    body: { name, crs: crs_of(d), ...(d.projected_epsg === null ? {} : { projected_epsg: d.projected_epsg }) },
+    headers: { 'Idempotency-Key': idempotency_key() },
+  });
 
 /// The newest flights, newest first.
 export const flights = (): Promise<Flight[]> => list('/missions', { query: { limit: 5 } });

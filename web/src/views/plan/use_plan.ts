@@ -102,10 +102,12 @@ export function usePlan(id: string | null) {
     }
     set_busy('');
   };
-  const questions = useRef(0);
+  const questions = useRef(0),
+    answered = useRef(false); // known before `ready` is drawn, which a page that is busy does much later
   const begin = useStable((): void => {
     document.title = 'Plan - anchord';
     set_ready(false);
+    answered.current = false;
     // Asked again, as when the link came back meanwhile, only the last answer counts: an earlier one must not take away what was drawn since.
     const question = ++questions.current;
     fetch_plans().then(
@@ -121,6 +123,7 @@ export function usePlan(id: string | null) {
         if (id && !list.some((p) => p.id === id)) set_unknown(id);
         set_problem('');
         set_ready(true);
+        answered.current = true;
       },
       (e: unknown) => {
         if (question === questions.current) set_problem(error_text(e));
@@ -129,7 +132,7 @@ export function usePlan(id: string | null) {
   });
   useEffect(begin, [id, begin]);
   // What is drawn stays: only where the plans could not be read are they asked for again.
-  useEffect(() => (ready ? undefined : when_back(begin)), [ready, begin]);
+  useEffect(() => when_back(() => answered.current || begin()), [begin]);
   useLoad(() => {
     published().then(
       ({ rows }) => set_known(new Map(rows.map((r) => [r.anchor, r]))),

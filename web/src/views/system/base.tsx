@@ -152,6 +152,12 @@ export function BasePanel() {
             <dt>σ of the base</dt>
             <dd>{site.sigma_m === null ? '–' : <Q v={fixed(site.sigma_m * 1000, 0)} u="mm" />}</dd>
           </div>
+          <div>
+            <dt>Map of drawings and survey files</dt>
+            <dd data-testid="site-epsg">
+              {site.projected_epsg === null ? <span class="mut">none</span> : `EPSG:${site.projected_epsg}`}
+            </dd>
+          </div>
         </dl>
       )}
       <h3>Where corrections come from</h3>
@@ -224,22 +230,33 @@ export function BasePanel() {
   );
 }
 
+/// `EPSG:31370` is how it is written elsewhere.
+const epsg_digits = (typed: string): string => typed.replace(/^\s*epsg\s*:/i, '');
+
 function DatumForm({ site, done, close }: { site: Site | null; done: () => void; close: () => void }) {
   const [name, set_name] = useState(site?.name ?? ''),
     [frame, set_frame] = useState(site?.frame ?? ''),
     [epoch, set_epoch] = useState(site?.epoch == null ? '' : String(site.epoch)),
     [source, set_source] = useState<BaseSource>(site?.source ?? ''),
     [sigma, set_sigma] = useState(site?.sigma_m == null ? '' : String(site.sigma_m * 1000)),
+    [epsg, set_epsg] = useState(site?.projected_epsg == null ? '' : String(site.projected_epsg)),
     [problem, set_problem] = useState('');
   const send = async (): Promise<void> => {
     const wrong = [
       ['Epoch', epoch, '2026.34'],
       ['σ of its position', sigma, '8'],
+      ['EPSG code of the map', epsg_digits(epsg), '31370'],
     ].find(([, typed]) => Number.isNaN(typed_number(typed!)));
     if (wrong)
       return set_problem(`${wrong[0]}: “${wrong[1]}” is not a number. Write it without a unit, like ${wrong[2]}.`);
     const mm = typed_number(sigma),
-      d = { frame: frame.trim(), epoch: typed_number(epoch), source, sigma_m: mm === null ? null : mm / 1000 };
+      d = {
+        frame: frame.trim(),
+        epoch: typed_number(epoch),
+        source,
+        sigma_m: mm === null ? null : mm / 1000,
+        projected_epsg: typed_number(epsg_digits(epsg)),
+      };
     try {
       await (site ? change_site(site.id, d) : create_site(name.trim(), d));
       say('Saved: included in every position from now on');
@@ -299,6 +316,16 @@ function DatumForm({ site, done, close }: { site: Site | null; done: () => void;
         <label>
           <span class="lab">σ of its position, mm</span>
           <input value={sigma} inputMode="decimal" placeholder="8" onInput={(e) => set_sigma(e.currentTarget.value)} />
+        </label>
+        <label>
+          <span class="lab">Map of drawings and survey files, EPSG code</span>
+          <input
+            value={epsg}
+            inputMode="numeric"
+            placeholder="31370"
+            data-testid="base-epsg"
+            onInput={(e) => set_epsg(e.currentTarget.value)}
+          />
         </label>
       </div>
       <Problem text={problem} />

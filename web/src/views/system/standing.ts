@@ -66,6 +66,7 @@ const DROPPED: Readonly<Record<string, string>> = {
   implausible_position: 'an impossible position',
   repeated_epoch: 'a repeated epoch',
   out_of_order: 'out of order',
+  time_step: 'a time that jumped once (a damaged one, or another receiver on this line?)',
   caster_refused: 'the caster refused',
   no_rtcm_bytes: 'bytes that are not RTCM',
   not_utf8: 'messages that are not UTF-8',
@@ -193,7 +194,7 @@ function not_linked(d: Device): Standing {
   if (/received for too long/.test(d.reason)) return silent(d);
   return bad(word, reason || 'The link is gone.', 'It is opened again by itself.');
 }
-function silent(d: Device, noise = /make no frame/.test(d.reason)): Standing {
+function silent(d: Device, noise = /make no frame|none of them can be used/.test(d.reason)): Standing {
   if (d.kind === 'pozyx')
     return bad(
       'SILENT',
@@ -396,7 +397,7 @@ export function standing(d: Device, recent: Lately, same_id_speaks = true): Stan
     return stand('found', 'info', 'OPENING', 'Its link is being opened.');
   if (!linked) return not_linked(d);
   if (d.state === 'silent')
-    return silent(d, total(recent.dropped) > (recent.dropped.no_reply ?? 0) || /make no frame/.test(d.reason));
+    return silent(d, total(recent.dropped) > (recent.dropped.no_reply ?? 0) || /make no frame|none of them can be used/.test(d.reason));
   if (d.state === 'open' && noise_bytes(recent.dropped) > 0) return silent(d, true);
   if (d.state === 'open' && (d.counters.opened ?? 0) > 1)
     return caution(
