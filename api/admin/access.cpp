@@ -8,6 +8,8 @@
 
 #include "api/admin/secrets.hpp"
 #include "api/kit/idempotency.hpp"
+#include "api/kit/record_limits.hpp"
+#include "core/base/line_text.hpp"
 #include "core/base/locked.hpp"
 #include "core/base/text.hpp"
 
@@ -214,8 +216,9 @@ bool AccessService::has_tokens() const {
 Result<NewToken> AccessService::create_token(std::string_view name, const std::vector<std::string>& roles,
                                              std::optional<UtcTime> expires, const Principal& by,
                                              std::string_view from, const TokenBounds& bounds) {
-  if (name.empty() || name.size() > 100)
-    return make_error(Errc::invalid_argument, "the name must have 1 to 100 characters");
+  if (is_blank(name)) return make_error(Errc::invalid_argument, "the name must not be empty");
+  if (const auto fault = line_fault(name, record_limits::k_token_name); fault != LineFault::none)
+    return make_error(Errc::invalid_argument, "the name " + in_words(fault, record_limits::k_token_name));
   if (roles.empty()) return make_error(Errc::invalid_argument, "a token needs at least one role");
   for (const auto& word : roles) {
     BOOST_OUTCOME_TRYV(k_role_words.parse("role", word));

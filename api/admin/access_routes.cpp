@@ -5,6 +5,7 @@
 #include "api/admin/access.hpp"
 #include "api/kit/problem.hpp"
 #include "api/kit/reader.hpp"
+#include "api/kit/record_limits.hpp"
 #include "api/kit/router.hpp"
 #include "api/kit/support.hpp"
 #include "core/base/to_wire.hpp"
@@ -172,7 +173,8 @@ Response create_token(AccessService& access, SiteStore& known, OrganizationStore
   const json body =
       body_of(request, {"name", "roles", "expires_at", "sites", "organization", "requests_per_minute"});
   std::vector<FieldError> faults;
-  const std::string name = text_field(body, "name", faults);
+  const std::string name =
+      Fields(body, "", faults).text("name", record_limits::k_token_name, true).value_or("");
   std::vector<std::string> roles;
   const auto list = body.find("roles");
   if (list == body.end() || !list->is_array() || list->empty()) {

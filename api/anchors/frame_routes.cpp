@@ -8,6 +8,7 @@
 #include "api/kit/current_sites.hpp"
 #include "api/kit/id_page.hpp"
 #include "api/kit/reader.hpp"
+#include "api/kit/record_limits.hpp"
 #include "api/kit/support.hpp"
 #include "core/geo/enu.hpp"
 #include "core/geo/source_crs.hpp"
@@ -38,7 +39,7 @@ LocalFrame find(AnchorApi& s, const std::string& text) {
 void read_fields(const nlohmann::json& body, bool whole, LocalFrame& frame) {
   std::vector<FieldError> errors;
   Fields fields(body, "", errors);
-  if (const auto name = fields.text("name", 80, whole)) {
+  if (const auto name = fields.text("name", record_limits::k_frame_name, whole)) {
     frame.name = *name;
     if (name->empty()) fields.error("name", "required", "a frame needs a name");
   }

@@ -4,6 +4,8 @@
 
 #include "api/kit/or_null.hpp"
 #include "api/kit/reader.hpp"
+#include "api/kit/record_limits.hpp"
+#include "api/wire/row_limits.hpp"
 #include "core/base/to_wire.hpp"
 
 namespace anchord::api {
@@ -13,12 +15,9 @@ using Ordered = nlohmann::ordered_json;
 
 namespace {
 
-/// Longest texts of facility data; beyond it somebody pastes a document into a field.
-constexpr std::size_t k_max_text = 200;
-
 /// In a merge-patch null clears, absent keeps.
 void patch_text(Fields& fields, const Json& body, const char* key, std::string& target) {
-  if (auto text = fields.text(key, k_max_text))
+  if (auto text = fields.text(key, record_limits::k_name))
     target = *text;
   else if (body.is_object() && body.contains(key) && body[key].is_null())
     target.clear();
@@ -49,11 +48,11 @@ void patch_site(const Json& body, bool whole, Site& site, std::vector<FieldError
   Fields fields(body, "", errors);
   if (!fields.is_object()) return;
   const auto cleared = [&](const char* key) { return body.contains(key) && body[key].is_null(); };
-  if (const auto text = fields.text("name", k_max_text, whole)) site.name = *text;
+  if (const auto text = fields.text("name", record_limits::k_name, whole)) site.name = *text;
   if (const Json* origin = fields.child("origin")) {
     Fields inner(*origin, "/origin", errors);
     const auto lon = inner.number("lon", -180, 180, true), lat = inner.number("lat", -90, 90, true),
-               height = inner.number("h_m", -500, 9000, true);
+               height = inner.number("h_m", row_limits::k_height_m.min, row_limits::k_height_m.max, true);
     inner.finish();
     if (lon && lat && height) site.origin = Wgs84{*lat, *lon, *height};
   } else if (cleared("origin")) {
@@ -62,7 +61,7 @@ void patch_site(const Json& body, bool whole, Site& site, std::vector<FieldError
   if (const Json* outline = fields.child("outline")) {
     std::string wrong;
     auto rings = rings_of(*outline, wrong);
-    if (!rings || to_wire(*outline).size() > 100'000)
+    if (!rings || to_wire(*outline).size() > record_limits::k_outline_bytes)
       errors.push_back({"/outline" + wrong, "wrong_type",
                         "must be a GeoJSON Polygon below 100 kB, its corners [lon, lat] in degrees"});
     else
@@ -73,17 +72,22 @@ void patch_site(const Json& body, bool whole, Site& site, std::vector<FieldError
   if (const Json* crs = fields.child("crs")) {
     Fields inner(*crs, "/crs", errors);
     patch_text(inner, *crs, "frame", site.crs_frame);
-    if (const auto epoch = inner.number("epoch", 1900, 2200)) site.crs_epoch = *epoch;
+    if (const auto epoch =
+            inner.number("epoch", record_limits::k_crs_epoch_year.min, record_limits::k_crs_epoch_year.max))
+      site.crs_epoch = *epoch;
     if (const Json* base = inner.child("base")) {
       Fields deepest(*base, "/crs/base", errors);
-      constexpr std::array<std::string_view, 3> k_sources{"known_point", "survey_in", "network"};
-      if (auto source = deepest.word("source", k_sources)) site.base_source = *std::move(source);
-      if (const auto sigma = deepest.number("sigma_m", 0, 100)) site.base_sigma_m = *sigma;
+      if (auto source = deepest.word("source", record_limits::k_base_sources))
+        site.base_source = *std::move(source);
+      if (const auto sigma =
+              deepest.number("sigma_m", record_limits::k_base_sigma_m.min, record_limits::k_base_sigma_m.max))
+        site.base_sigma_m = *sigma;
       deepest.finish();
     }
     inner.finish();
   }
-  if (const auto epsg = fields.integer("projected_epsg", 1024, 999'999))
+  if (const auto epsg =
+          fields.integer("projected_epsg", record_limits::k_epsg.min, record_limits::k_epsg.max))
     site.projected_epsg = static_cast<int>(*epsg);
   else if (cleared("projected_epsg"))
     site.projected_epsg.reset();
@@ -125,7 +129,8 @@ void patch_anchor(const Json& body, Anchor& anchor, std::vector<FieldError>& err
       anchor.external_ids.clear();
       for (std::size_t i = 0; i < ids->size(); ++i) {
         Fields inner((*ids)[i], "/external_ids/" + std::to_string(i), errors);
-        const auto system = inner.text("system", 60, true), id = inner.text("id", k_max_text, true);
+        const auto system = inner.text("system", record_limits::k_external_system, true),
+                   id = inner.text("id", record_limits::k_name, true);
         inner.finish();
         if (system && id) anchor.external_ids.emplace_back(*system, *id);
       }

@@ -17,6 +17,7 @@
 #include "api/kit/html_page.hpp"
 #include "api/kit/id_page.hpp"
 #include "api/kit/reader.hpp"
+#include "api/kit/record_limits.hpp"
 #include "api/kit/support.hpp"
 #include "api/missions/mission_service.hpp"
 #include "core/base/to_wire.hpp"
@@ -145,8 +146,8 @@ PublishRequest read_publish(const nlohmann::json& body) {
   std::vector<FieldError> errors;
   Fields fields(body, "", errors);
   PublishRequest out;
-  out.note = fields.text("note", 500).value_or("");
-  const auto reason = fields.text("reason", 500).value_or("");
+  out.note = fields.text("note", record_limits::k_note).value_or("");
+  const auto reason = fields.text("reason", record_limits::k_reason).value_or("");
   const auto id_at = [&](const nlohmann::json& item, const std::string& at) -> std::optional<NetworkId> {
     const auto id = parse_network_id(item.is_string() ? item.get_ref<const std::string&>() : "");
     if (id) return id.value();
@@ -173,7 +174,7 @@ PublishRequest read_publish(const nlohmann::json& body) {
         const std::string at = "/overrides/" + std::to_string(i);
         Fields inner((*list)[i], at, errors);
         const auto text = inner.text("network_id", 20, true);
-        const auto why = inner.text("reason", 500, true);
+        const auto why = inner.text("reason", record_limits::k_reason, true);
         inner.finish();
         if (!text || !why) continue;
         if (why->empty()) errors.push_back({at + "/reason", "required", "an override needs a reason"});

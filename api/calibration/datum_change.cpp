@@ -3,6 +3,7 @@
 #include <nlohmann/json.hpp>
 
 #include "api/kit/reader.hpp"
+#include "api/kit/record_limits.hpp"
 #include "core/geo/enu.hpp"
 #include "core/localize/error_ellipse.hpp"
 
@@ -98,7 +99,7 @@ DatumRequest read_datum_request(const Json& body, std::vector<FieldError>& error
   }
   if (given != 1) fields.error("", "conflict", "give the change in one way: shift, mark or helmert");
   out.sigma_m = fields.number("sigma_m", 0, 100).value_or(0);
-  out.note = fields.text("note", 500, true).value_or("");
+  out.note = fields.text("note", record_limits::k_note, true).value_or("");
   fields.finish();
   return out;
 }

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "core/base/line_text.hpp"
 #include "core/base/text.hpp"
 #include "core/base/to_wire.hpp"
 
@@ -221,7 +222,7 @@ std::optional<std::int64_t> Fields::integer(std::string_view key, std::int64_t m
   return number;
 }
 
-std::optional<std::string> Fields::text(std::string_view key, std::size_t max_bytes, bool required) {
+std::optional<std::string> Fields::text(std::string_view key, std::size_t max_characters, bool required) {
   const Json* value = child(key);
   if (value == nullptr) {
     if (required) error(key, "required", std::string(key) + " is missing");
@@ -232,17 +233,14 @@ std::optional<std::string> Fields::text(std::string_view key, std::size_t max_by
     return std::nullopt;
   }
   const auto& text = value->get_ref<const std::string&>();
-  const bool blank = text.find_first_not_of(' ') == std::string::npos;
-  if (text.size() > max_bytes || (required && blank)) {
-    error(key, "out_of_range",
-          blank ? "must not be empty" : "must be at most " + std::to_string(max_bytes) + " bytes");
+  if (required && is_blank(text)) {
+    error(key, "out_of_range", "must not be empty");
     return std::nullopt;
   }
-  for (const char c : text) {
-    if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f) {
-      error(key, "control_character", "must not contain control characters");
-      return std::nullopt;
-    }
+  if (const auto fault = line_fault(text, max_characters); fault != LineFault::none) {
+    error(key, fault == LineFault::too_long ? "out_of_range" : "control_character",
+          in_words(fault, max_characters));
+    return std::nullopt;
   }
   return text;
 }

@@ -7,6 +7,7 @@
 
 #include "api/kit/contract_fields.hpp"
 #include "api/kit/reader.hpp"
+#include "api/kit/record_limits.hpp"
 #include "core/base/text.hpp"
 #include "core/base/to_wire.hpp"
 
@@ -144,7 +145,7 @@ std::string optional_reason(const Request& request) {
   std::vector<FieldError> errors;
   const auto body = json_body(request, true);
   Fields fields(body, "", errors);
-  auto reason = fields.text("reason", 500).value_or("");
+  auto reason = fields.text("reason", record_limits::k_reason).value_or("");
   fields.finish();
   refuse_if_any(errors);
   return reason;

@@ -4,19 +4,13 @@
 
 #include "api/kit/or_null.hpp"
 #include "api/kit/reader.hpp"
+#include "api/kit/record_limits.hpp"
 #include "api/wire/live_writer.hpp"
 
 namespace anchord::api {
 
 using Json = nlohmann::json;
 using Ordered = nlohmann::ordered_json;
-
-namespace {
-
-/// Longest names; beyond it somebody pastes a document into a field.
-constexpr std::size_t k_max_text = 200;
-
-}  // namespace
 
 Ordered mission_json(const Mission& mission, std::optional<std::uint64_t> n_ranges,
                      std::optional<std::uint64_t> n_fixes) {
@@ -46,9 +40,9 @@ Ordered mission_json(const Mission& mission, std::optional<std::uint64_t> n_rang
 Mission read_mission(const Json& body, std::vector<FieldError>& errors) {
   Mission mission;
   Fields fields(body, "", errors);
-  if (const auto text = fields.text("name", k_max_text, true)) mission.name = *text;
-  if (const auto text = fields.text("kit", k_max_text)) mission.kit = *text;
-  if (const auto text = fields.text("radio", k_max_text)) mission.radio = *text;
+  if (const auto text = fields.text("name", record_limits::k_name, true)) mission.name = *text;
+  if (const auto text = fields.text("kit", record_limits::k_name)) mission.kit = *text;
+  if (const auto text = fields.text("radio", record_limits::k_name)) mission.radio = *text;
   if (const auto text = fields.text("site", 36)) {
     const auto id = parse_uuid(*text);
     if (id)
@@ -60,7 +54,7 @@ Mission read_mission(const Json& body, std::vector<FieldError>& errors) {
   // Required: an arm applied to the wrong point is a silent error of decimetres.
   if (const auto point = fields.word("track_point", k_point_words, true)) mission.point = *point;
   if (const Json* tags = fields.child("tags")) {
-    if (!tags->is_array() || tags->size() > 64) {
+    if (!tags->is_array() || tags->size() > record_limits::k_most_tags) {
       fields.error("tags", "wrong_type", "must be an array of at most 64 tag antennas");
     } else {
       for (std::size_t i = 0; i < tags->size(); ++i) {
@@ -74,7 +68,8 @@ Mission read_mission(const Json& body, std::vector<FieldError>& errors) {
             inner.error("tag", "bad_id", id.error().message);
         }
         if (const auto n = inner.integer("antenna", 0, 255)) tag.antenna = static_cast<std::uint8_t>(*n);
-        if (const auto arm = inner.numbers("lever_arm_body_m", 3, -100, 100, true))
+        if (const auto arm = inner.numbers("lever_arm_body_m", 3, record_limits::k_lever_arm_m.min,
+                                           record_limits::k_lever_arm_m.max, true))
           tag.lever_arm_body_m = {(*arm)[0], (*arm)[1], (*arm)[2]};
         inner.finish();
         for (const auto& other : mission.tags) {

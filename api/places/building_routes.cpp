@@ -2,6 +2,7 @@
 
 #include "api/kit/id_page.hpp"
 #include "api/kit/reader.hpp"
+#include "api/kit/record_limits.hpp"
 #include "api/kit/support.hpp"
 #include "api/places/place_json.hpp"
 #include "api/places/place_records.hpp"
@@ -21,14 +22,15 @@ Building path_building(PlaceApi& s, const Request& request) {
 void read(const Json& body, Building& building, bool made) {
   std::vector<FieldError> errors;
   Fields fields(body, "", errors);
-  if (const auto name = fields.text("name", k_max_place_text, made)) building.name = *name;
+  if (const auto name = fields.text("name", record_limits::k_name, made)) building.name = *name;
   if (const auto text = fields.text("site", 36, made)) {
     if (const auto id = parse_uuid(*text))
       building.site = SiteId{id.value()};
     else
       fields.error("site", "bad_id", id.error().message);
   }
-  if (const auto height = fields.number("height_m", 1, 1000))
+  if (const auto height = fields.number("height_m", record_limits::k_building_height_m.min,
+                                        record_limits::k_building_height_m.max))
     building.height_m = *height;
   else if (body.is_object() && body.contains("height_m") && body["height_m"].is_null())
     building.height_m.reset();

@@ -2,6 +2,7 @@
 
 #include "api/kit/id_page.hpp"
 #include "api/kit/reader.hpp"
+#include "api/kit/record_limits.hpp"
 #include "api/kit/support.hpp"
 #include "api/places/place_json.hpp"
 #include "api/places/place_records.hpp"
@@ -21,7 +22,7 @@ namespace {
 void read(const Json& body, Floor& floor, bool made) {
   std::vector<FieldError> errors;
   Fields fields(body, "", errors);
-  if (const auto name = fields.text("name", k_max_place_text, made)) floor.name = *name;
+  if (const auto name = fields.text("name", record_limits::k_name, made)) floor.name = *name;
   if (made) {
     if (const auto text = fields.text("building", 36, true)) {
       if (const auto id = parse_uuid(*text))
@@ -30,8 +31,11 @@ void read(const Json& body, Floor& floor, bool made) {
         fields.error("building", "bad_id", id.error().message);
     }
   }
-  if (const auto level = fields.number("level", -50, 300, made)) floor.level = *level;
-  if (const auto height = fields.number("base_height_m", -300, 1000))
+  if (const auto level =
+          fields.number("level", record_limits::k_floor_level.min, record_limits::k_floor_level.max, made))
+    floor.level = *level;
+  if (const auto height = fields.number("base_height_m", record_limits::k_floor_base_m.min,
+                                        record_limits::k_floor_base_m.max))
     floor.base_height_m = *height;
   else if (body.is_object() && body.contains("base_height_m") && body["base_height_m"].is_null())
     floor.base_height_m.reset();

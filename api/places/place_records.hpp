@@ -11,8 +11,6 @@
 
 namespace anchord::api {
 
-inline constexpr std::size_t k_max_place_text = 200;
-
 inline Floor path_floor(PlaceApi& s, const Request& request) {
   return value_or_problem(s.places.floor(path_id<FloorId>(request)));
 }

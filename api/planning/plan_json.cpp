@@ -6,6 +6,7 @@
 
 #include "api/kit/or_null.hpp"
 #include "api/kit/reader.hpp"
+#include "api/kit/record_limits.hpp"
 #include "core/base/to_wire.hpp"
 
 namespace anchord::api {
@@ -217,7 +218,7 @@ Plan read_plan(const Json& body, std::vector<FieldError>& errors) {
   if (!f.is_object()) return plan;
   for (const char* given : {"id", "revision", "created_at", "changed_at", "links", "notes"})
     (void)f.child(given);
-  take(f.text("name", 200, true), plan.name);
+  take(f.text("name", record_limits::k_name, true), plan.name);
   if (const auto text = f.text("site", 36)) {
     if (const auto id = parse_uuid(*text))
       plan.site = SiteId{id.value()};

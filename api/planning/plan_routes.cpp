@@ -5,10 +5,12 @@
 #include "api/kit/current_sites.hpp"
 #include "api/kit/id_page.hpp"
 #include "api/kit/reader.hpp"
+#include "api/kit/record_limits.hpp"
 #include "api/kit/support.hpp"
 #include "api/planning/plan_json.hpp"
 #include "api/planning/routes.hpp"
 #include "api/planning/site_structures.hpp"
+#include "core/base/line_text.hpp"
 #include "core/base/text.hpp"
 #include "core/base/to_wire.hpp"
 #include "core/ports/plan_store.hpp"
@@ -156,7 +158,10 @@ Response import(PlanningApi& s, const Request& request) {
                    type.starts_with("application/xml") || type.starts_with("text/xml");
   if (!kml) (void)json_body(request);  // refuses another type, broken text, compression
   Plan plan = read_plan_file(text_body(request), notes, errors);
-  plan.name = to_utf8(request.query_value("name").value_or("Imported plan"), 200);
+  plan.name = to_utf8(request.query_value("name").value_or("Imported plan"));
+  if (const auto fault = line_fault(plan.name, record_limits::k_name); fault != LineFault::none)
+    errors.push_back({"/name", fault == LineFault::too_long ? "out_of_range" : "control_character",
+                      in_words(fault, record_limits::k_name)});
   refuse_if_any(errors);
   if (query_flag(request, "dry_run")) {
     auto out = plan_json(plan);

@@ -3,6 +3,7 @@
 #include <nlohmann/json.hpp>
 
 #include "api/kit/reader.hpp"
+#include "api/kit/record_limits.hpp"
 #include "core/base/to_wire.hpp"
 
 namespace anchord::api {
@@ -136,7 +137,7 @@ ExclusionRequest read_exclusion_request(const Json& body, std::vector<FieldError
   s.until = read_time(fields, "until");
   s.anchor = read_id(fields, "anchor");
   s.tag = read_id(fields, "tag");
-  out.reason = fields.text("reason", 500, true).value_or("");
+  out.reason = fields.text("reason", record_limits::k_reason, true).value_or("");
   if (fields.has("reason") && out.reason.find_first_not_of(" \t\r\n") == std::string::npos)
     fields.error("reason", "required",
                  "give a reason: it is shown in the list of exclusions and in every calibration");

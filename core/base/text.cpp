@@ -4,6 +4,8 @@
 #include <array>
 #include <cstdio>
 
+#include "core/base/line_text.hpp"
+
 namespace anchord {
 namespace {
 
@@ -52,11 +54,26 @@ bool control(std::string_view character) {
   return first < 0x20 || first == 0x7f || (first == 0xc2 && static_cast<unsigned char>(character[1]) < 0xa0);
 }
 
-/// The last byte says it all: C1 controls are C2 80 to C2 9F.
+/// U+202A to U+202E and U+2066 to U+2069: text behind them is read in another order than it is written.
+bool turns_writing(std::string_view character) {
+  if (character.size() != 3 || character[0] != '\xe2') return false;
+  const auto last = static_cast<unsigned char>(character[2]);
+  return (character[1] == '\x80' && last >= 0xaa && last <= 0xae) ||
+         (character[1] == '\x81' && last >= 0xa6 && last <= 0xa9);
+}
+
+/// Of what control() and turns_writing() name. The last byte of a control says it all: C1 are C2 80 to C2 9F.
+unsigned code_of(std::string_view character) {
+  const auto byte = [&](std::size_t i) {
+    return static_cast<unsigned>(static_cast<unsigned char>(character[i]));
+  };
+  if (character.size() < 3) return byte(character.size() - 1);
+  return ((byte(0) & 0x0fU) << 12) | ((byte(1) & 0x3fU) << 6) | (byte(2) & 0x3fU);
+}
+
 void append_code(std::string& out, const char* format, std::string_view character) {
   std::array<char, 8> code{};
-  std::snprintf(code.data(), code.size(), format,
-                static_cast<unsigned>(static_cast<unsigned char>(character.back())));
+  std::snprintf(code.data(), code.size(), format, code_of(character));
   out += code.data();
 }
 
@@ -95,10 +112,32 @@ std::string printable(std::string_view bytes) {
       out += k_replacement;
     else if (control(character) && character != "\n" && character != "\t")
       append_code(out, "\\x%02x", character);
+    else if (turns_writing(character))
+      append_code(out, "\\u%04x", character);
     else
       out += character;
   }
   return out;
+}
+
+std::size_t characters_of(std::string_view text) {
+  return static_cast<std::size_t>(
+      std::ranges::count_if(text, [](char c) { return (static_cast<unsigned char>(c) & 0xc0U) != 0x80; }));
+}
+
+LineFault line_fault(std::string_view text, std::size_t max_characters) {
+  if (text.size() > 4 * max_characters ||
+      (text.size() > max_characters && characters_of(text) > max_characters))
+    return LineFault::too_long;
+  const bool control =
+      std::ranges::any_of(text, [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7f; });
+  return control ? LineFault::control_character : LineFault::none;
+}
+
+std::string in_words(LineFault fault, std::size_t max_characters) {
+  if (fault == LineFault::too_long)
+    return "must be at most " + std::to_string(max_characters) + " characters";
+  return fault == LineFault::control_character ? "must not contain control characters" : "";
 }
 
 void append_json_text(std::string& out, std::string_view text) {
@@ -117,7 +156,7 @@ void append_json_text(std::string& out, std::string_view text) {
       (out += '\\') += character;
     else if (character == "\n")
       out += "\\n";
-    else if (control(character))
+    else if (control(character) || turns_writing(character))
       append_code(out, "\\u%04x", character);
     else
       out += character;

@@ -39,6 +39,35 @@ TEST_F(Resources, RefuseANameOfSpaces) {
   EXPECT_EQ(json(response)["errors"][0]["pointer"], "/name");
 }
 
+// maxLength of the contract counts characters.
+TEST_F(Resources, TakeNamesOf200CharactersHoweverManyBytesTheyHave) {
+  for (const std::string one : {"a", "\xc3\xa9", "\xe6\x97\xa5", "\xf0\x9f\x9b\xb0"}) {
+    std::string name;
+    for (int i = 0; i < 200; ++i) name += one;
+    const auto mission = [&](const std::string& said) {
+      return post("/api/v1/missions",
+                  Json{{"name", said}, {"frame", "wgs84"}, {"track_point", "body"}}.dump());
+    };
+    const auto made = mission(name);
+    ASSERT_EQ(made.status, 201) << made.body;
+    EXPECT_EQ(json(made)["name"], name);
+    const auto longer = mission(name + one);
+    EXPECT_EQ(longer.status, 422);
+    EXPECT_EQ(json(longer)["errors"][0]["detail"], "must be at most 200 characters");
+    EXPECT_EQ(post("/api/v1/sites", Json{{"name", name}}.dump()).status, 201);
+  }
+}
+
+TEST_F(Resources, RefuseControlCharactersInNamesOfTokens) {
+  for (const auto& odd : {std::string("a\0b", 3), std::string("a\nb"), std::string("a\x1b[2J")}) {
+    const auto token = post("/api/v1/tokens", Json{{"name", odd}, {"roles", {"viewer"}}}.dump());
+    EXPECT_EQ(token.status, 422) << token.body;
+    EXPECT_EQ(json(token)["errors"][0]["pointer"], "/name") << token.body;
+  }
+  EXPECT_EQ(post("/api/v1/tokens", R"({"name":"  ","roles":["viewer"]})").status, 422);
+  EXPECT_EQ(post("/api/v1/tokens", R"({"name":"a","roles":["viewer"]})").status, 201);
+}
+
 TEST_F(Resources, FinishAMissionOnce) {
   const auto id = mission();
   EXPECT_EQ(json(post("/api/v1/missions/" + id + "/actions", R"({"action":"finish"})"))["state"], "finished");

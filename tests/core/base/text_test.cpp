@@ -6,6 +6,7 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
+#include "core/base/line_text.hpp"
 #include "core/base/to_wire.hpp"
 
 namespace anchord::text_test {
@@ -68,6 +69,40 @@ TEST(Printable, ShowsWhatWouldMoveATerminal) {
                       "cke \xc2\xa0"),
             "Br\xc3\xbc"
             "cke \xc2\xa0");
+}
+
+TEST(Printable, ShowsWhatTurnsTheDirectionOfWriting) {
+  for (const char last : {'\xaa', '\xab', '\xac', '\xad', '\xae'}) {
+    const std::string one = std::string("\xe2\x80") + last;
+    EXPECT_EQ(printable("a" + one + "b").find(one), std::string::npos);
+    EXPECT_EQ(json_text(one).find(one), std::string::npos);
+  }
+  for (const char last : {'\xa6', '\xa7', '\xa8', '\xa9'}) {
+    const std::string one = std::string("\xe2\x81") + last;
+    EXPECT_EQ(printable("a" + one + "b").find(one), std::string::npos);
+    EXPECT_EQ(json_text(one).find(one), std::string::npos);
+  }
+  EXPECT_EQ(printable("gnp\xe2\x80\xaexe"), "gnp\\u202exe");
+  EXPECT_EQ(json_text("\xe2\x81\xa6x"), R"("\u2066x")");
+  // Punctuation of the same block, and letters that are read from the right.
+  const std::string plain = "\xe2\x80\xa9\xe2\x80\xaf\xe2\x81\xa5 \xd9\x82\xd8\xa7\xd8\xb9\xd8\xa9";
+  EXPECT_EQ(printable(plain), plain);
+}
+
+TEST(LineFault, CountsCharactersAndFindsControls) {
+  std::string emoji, cjk;
+  for (int i = 0; i < 200; ++i) {
+    emoji += "\xf0\x9f\x9b\xb0";
+    cjk += "\xe6\x97\xa5";
+  }
+  EXPECT_EQ(characters_of(emoji), 200U);
+  for (const auto& text : {emoji, cjk, std::string(200, 'a'), std::string()})
+    EXPECT_EQ(line_fault(text, 200), LineFault::none);
+  for (const auto& text : {emoji + "a", cjk + "a", std::string(201, 'a')})
+    EXPECT_EQ(line_fault(text, 200), LineFault::too_long);
+  EXPECT_EQ(line_fault(std::string(801, '\x80'), 200), LineFault::too_long) << "no more bytes than four each";
+  for (const char c : {'\0', '\t', '\n', '\r', '\x1b', '\x7f'})
+    EXPECT_EQ(line_fault(std::string("a") + c, 200), LineFault::control_character);
 }
 
 TEST(JsonText, IsOneJsonStringOnOneLineForEveryPairOfBytes) {
