@@ -60,7 +60,7 @@ set(rows
   "api/mqtt: core/base core/ports api/kit api/stream api/anchors"
   "api/omlox: core/base core/types core/ports core/geo api/kit api/stream api/anchors api/webhooks"
   "api/places: core/base core/types core/ports core/geo core/floor_plan api/kit api/admin api/work"
-  "api/bundles: core/base core/types core/ports api/kit api/formats api/admin api/planning"
+  "api/bundles: core/base core/types core/ports api/kit api/wire api/formats api/admin api/planning"
   "api: core/base core/types core/ports core/geo core/localize api/kit api/scope api/stream api/wire api/admin api/work api/devices api/learning api/missions api/measurements api/anchors api/planning api/flight api/calibration api/exchange api/webhooks api/mqtt api/omlox api/places api/bundles"
 
   "migrations:"
@@ -74,7 +74,7 @@ set(rows
   "server/app: core/base drivers/link drivers/drone api/kit api/stream api/admin api/learning api/mqtt api server/storage server/mqtt server/runtime server/tls server/http server/config server/flight"
   "server/gateway: core/base core/ports api/kit api/measurements server/storage server/runtime server/http"
   "server/sync: core/base core/geo api/kit api/formats api/measurements server/runtime server/http server/gateway"
-  "server/cli: core/base core/types core/ports core/geo core/planning core/localize drivers/link drivers/gnss drivers/device drivers/sim api/wire api/formats api/admin api/learning api/measurements api/anchors api/calibration server/storage server/runtime server/tls server/http server/config server/flight server/app server/gateway server/sync"
+  "server/cli: core/base core/types core/ports core/geo core/planning core/localize drivers/link drivers/gnss drivers/device drivers/sim api/kit api/wire api/formats api/admin api/learning api/measurements api/anchors api/calibration server/storage server/runtime server/tls server/http server/config server/flight server/app server/gateway server/sync"
   "server: core/base server/cli")
 set(from_outside web)  # made by the build
 set(everywhere "Eigen/|boost/outcome/")

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cerrno>
 
-#include "api/bundles/bundle_values.hpp"
 #include "api/bundles/spool.hpp"
 
 namespace anchord::api {
@@ -123,6 +122,7 @@ Result<BundleEntry> entry_of(const std::string& name, const std::filesystem::pat
 
 Result<void> BundleZipSource::open(const BundleTable& table) {
   table_ = &table;
+  check_.emplace(table);
   lines_.reset();
   if (table.later && !zip_.has(bundle_entry_name(table))) return boost::outcome_v2::success();
   BOOST_OUTCOME_TRY(auto lines, ZipLines::open(zip_, bundle_entry_name(table)));
@@ -144,7 +144,7 @@ Result<bool> BundleZipSource::next(BundleRow& row) {
   auto read = read_bundle_line(*table_, line, width_);
   if (!read) return make_error(read.error().code, at + ": " + read.error().message);
   row = std::move(read).value();
-  if (const auto fault = fault_of(*table_, row); !fault.empty())
+  if (const auto fault = check_->fault_of(row); !fault.empty())
     return make_error(Errc::bad_frame, at + ": " + fault);
   return true;
 }

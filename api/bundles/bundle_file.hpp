@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "api/bundles/bundle_values.hpp"
 #include "api/bundles/routes.hpp"
 #include "api/formats/bundle.hpp"
 #include "core/base/sha256.hpp"
@@ -68,6 +69,7 @@ class BundleZipSource final : public BundleSource {
  private:
   const ZipReader& zip_;
   const BundleTable* table_{nullptr};
+  std::optional<RowCheck> check_;
   std::optional<ZipLines> lines_;
   std::size_t width_{};  ///< columns of its entry
 };

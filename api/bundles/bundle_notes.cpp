@@ -7,6 +7,7 @@
 #include "api/admin/flight_events.hpp"
 #include "api/formats/bundle.hpp"
 #include "api/kit/reader.hpp"
+#include "api/kit/record_limits.hpp"
 #include "core/base/to_wire.hpp"
 #include "core/ports/access_store.hpp"
 
@@ -17,8 +18,7 @@ constexpr std::size_t k_most_events = 100'000;
 constexpr std::size_t k_looked_at = 20'000;  // of the audit log, newest first
 
 constexpr const char* k_events = "events.ndjson";
-constexpr std::size_t k_code_bytes = 100, k_text_bytes = 10'000;
-constexpr std::int64_t k_latest_us = 9'000'000'000'000'000;  // in the year 2255, still nanoseconds in 64 bits
+constexpr std::size_t k_code_characters = 100;
 
 std::optional<EventPlace> read_place(const nlohmann::json* place, std::vector<FieldError>& errors) {
   if (place == nullptr) return std::nullopt;
@@ -36,9 +36,10 @@ std::optional<LiveEvent> read_event(std::string_view line, const MissionId& miss
   std::vector<FieldError> errors;
   Fields fields(json, "", errors);
   const auto id = parse_uuid(fields.text("id", 40, true).value_or(""));
-  const auto t_us = fields.integer("t_us", 0, k_latest_us, true);
+  const auto t_us = fields.integer("t_us", 0, record_limits::k_latest_us, true);
   const auto level = fields.word("level", k_event_level_words, true);
-  auto code = fields.text("code", k_code_bytes, true), text = fields.text("text", k_text_bytes, true);
+  auto code = fields.text("code", k_code_characters, true),
+       text = fields.text("text", record_limits::k_words, true);
   const auto place = read_place(fields.child("place"), errors);
   if (!errors.empty() || !id) return std::nullopt;
   return LiveEvent{.id = EventId{id.value()},

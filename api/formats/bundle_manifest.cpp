@@ -5,6 +5,8 @@
 #include <set>
 
 #include "api/kit/reader.hpp"
+#include "api/kit/record_limits.hpp"
+#include "core/base/line_text.hpp"
 #include "core/base/sha256.hpp"
 #include "core/base/text.hpp"
 #include "core/base/to_wire.hpp"
@@ -65,6 +67,14 @@ Result<std::vector<BundleEntry>> read_entries(const json& root) {
     out.push_back({text_of(entry, "name"), count_of(entry, "bytes"), count_of(entry, "rows"),
                    text_of(entry, "sha256")});
   return out;
+}
+
+/// It is told in events and on pages, as the name of the row is.
+Result<void> check_name(const char* of, const std::string& name) {
+  const auto fault = line_fault(name, record_limits::k_name);
+  if (fault == LineFault::none) return boost::outcome_v2::success();
+  return manifest_refused(std::string("manifest.json: the name of the ") + of + ' ' +
+                          in_words(fault, record_limits::k_name));
 }
 
 /// No entry more or less, every size and digest right. Reads all of it.
@@ -130,6 +140,7 @@ Result<BundleManifest> read_bundle_manifest(std::string_view text) {
   if (!id) return manifest_refused("the manifest gives no mission");
   out.mission = MissionId{id.value()};
   out.mission_name = text_of(*mission, "name");
+  BOOST_OUTCOME_TRYV(check_name("mission", out.mission_name));
   out.made_by = text_of(root, "made_by");
   BOOST_OUTCOME_TRY(out.entries, read_entries(root));
   if (text_of(root, "digest") != "sha256:" + bundle_digest(out))
@@ -183,6 +194,7 @@ Result<SiteManifest> read_site_manifest(std::string_view text) {
   if (!id) return manifest_refused("the manifest gives no site");
   out.site = SiteId{id.value()};
   out.site_name = text_of(*site, "name");
+  BOOST_OUTCOME_TRYV(check_name("site", out.site_name));
   out.made_by = text_of(root, "made_by");
   BOOST_OUTCOME_TRY(out.entries, read_entries(root));
   if (text_of(root, "digest") != "sha256:" + site_bundle_digest(out))

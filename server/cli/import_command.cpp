@@ -1,11 +1,15 @@
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <memory>
+#include <nlohmann/json.hpp>
 #include <string>
 
 #include "api/formats/flight_folder.hpp"
+#include "api/kit/record_limits.hpp"
 #include "api/measurements/flight_requests.hpp"
 #include "api/wire/exclusion_json.hpp"
+#include "api/wire/row_parser.hpp"
+#include "core/base/line_text.hpp"
 #include "core/base/text.hpp"
 #include "core/ports/exclusion_store.hpp"
 #include "core/ports/measurement_store.hpp"
@@ -56,7 +60,7 @@ Result<std::string> import_by_rest(const ImportOptions& options, FlightData flig
                                     to_string(make_uuid_v7(SystemClock{}.now()))));
   }
   BOOST_OUTCOME_TRY(upload.finish_mission());
-  std::fprintf(stderr, "%s: %s\n", name.c_str(), upload.summary().c_str());
+  std::fprintf(stderr, "%s: %s\n", printable(name).c_str(), printable(upload.summary()).c_str());
   return upload.mission_id();
 }
 
@@ -75,6 +79,37 @@ Result<void> append_all(std::vector<Row>& rows, const MissionId& mission, std::s
   return boost::outcome_v2::success();
 }
 
+/// Whether the server would refuse the row, were it sent: what is stored here leaves by bundles as well.
+bool refused(api::RowParser& parser, const Range& range) {
+  std::string text;
+  api::append_range(text, range, std::nullopt, true, {});
+  if (parser.range(text, range.mission)) return false;
+  std::vector<api::FieldError> errors;
+  (void)api::read_range(api::range_json(range, std::nullopt), range.mission, errors);
+  return !errors.empty();
+}
+bool refused(api::RowParser& parser, const Fix& fix) {
+  std::string text;
+  api::append_fix(text, fix, std::nullopt);
+  if (parser.fix(text, fix.mission)) return false;
+  std::vector<api::FieldError> errors;
+  (void)api::read_fix(api::fix_json(fix, std::nullopt), fix.mission, errors);
+  return !errors.empty();
+}
+
+Result<void> check(const Mission& mission) {
+  if (const auto fault = line_fault(mission.name, api::record_limits::k_name); fault != LineFault::none)
+    return make_error(Errc::invalid_argument,
+                      "the name of the flight " + in_words(fault, api::record_limits::k_name));
+  for (const auto& tag : mission.tags) {
+    constexpr auto bounds = api::record_limits::k_lever_arm_m;
+    if (tag.lever_arm_body_m.minCoeff() < bounds.min || tag.lever_arm_body_m.maxCoeff() > bounds.max)
+      return make_error(Errc::invalid_argument, "the lever arm of tag " + to_string(tag.tag) +
+                                                    " is longer than 100 m: lever arms are in metres");
+  }
+  return boost::outcome_v2::success();
+}
+
 Result<std::string> import_into_folder(const ImportOptions& options, FlightData flight) {
   StorageOptions storage;
   storage.data_dir = options.data_dir;
@@ -86,15 +121,19 @@ Result<std::string> import_into_folder(const ImportOptions& options, FlightData 
   mission.state = MissionState::finished;
   mission.created = now;
   mission.finished = now;
+  BOOST_OUTCOME_TRYV(check(mission));
   BOOST_OUTCOME_TRY(db->stores().missions.insert(mission));
-  // Not from a wire: a value that cannot be stored (NaN) is left out and counted, as the server would answer.
-  std::size_t refused = std::erase_if(flight.ranges, [](const Range& r) { return !(r.distance_m > 0); });
+  // Not from a wire: left out and counted, as the server would answer.
+  api::RowParser parser;
+  std::size_t n_refused =
+      std::erase_if(flight.ranges, [&](const Range& row) { return refused(parser, row); });
+  n_refused += std::erase_if(flight.fixes, [&](const Fix& row) { return refused(parser, row); });
   const std::size_t n = flight.fixes.size() + flight.ranges.size();
   auto& store = db->stores().measurements;
-  BOOST_OUTCOME_TRY(append_all(flight.fixes, mission.id, refused, [&](std::vector<Fix> rows) {
+  BOOST_OUTCOME_TRY(append_all(flight.fixes, mission.id, n_refused, [&](std::vector<Fix> rows) {
     return store.append_fixes(std::move(rows), false);
   }));
-  BOOST_OUTCOME_TRY(append_all(flight.ranges, mission.id, refused, [&](std::vector<Range> rows) {
+  BOOST_OUTCOME_TRY(append_all(flight.ranges, mission.id, n_refused, [&](std::vector<Range> rows) {
     return store.append_ranges(std::move(rows), false);
   }));
   for (Exclusion one : flight.exclusions) {
@@ -105,7 +144,7 @@ Result<std::string> import_into_folder(const ImportOptions& options, FlightData 
     if (!word) continue;
     BOOST_OUTCOME_TRYV(db->stores().exclusions.include(mission.id, one.id, *word));
   }
-  std::fprintf(stderr, "%s: %zu rows stored, %zu rejected\n", mission.name.c_str(), n, refused);
+  std::fprintf(stderr, "%s: %zu rows stored, %zu rejected\n", printable(mission.name).c_str(), n, n_refused);
   return to_string(mission.id);
 }
 

@@ -304,9 +304,8 @@ class Reader {
       const auto at = std::ranges::find(spec.columns, name, &BundleColumnSql::bundle);
       return row[static_cast<std::size_t>(at - spec.columns.begin())];
     };
-    if (whole_of(cell("state")) == static_cast<std::int64_t>(MissionState::recording))
-      return make_error(Errc::invalid_argument,
-                        "the mission of a bundle must be finished, this one is recording");
+    if (whole_of(cell("state")) != static_cast<std::int64_t>(MissionState::finished))
+      return make_error(Errc::invalid_argument, "the mission of a bundle must be finished, this one is not");
     const auto* sigma_m = std::get_if<double>(&cell("lever_arm_sigma_m"));
     if (sigma_m != nullptr && !is_lever_arm_sigma(*sigma_m))
       return make_error(Errc::invalid_argument,

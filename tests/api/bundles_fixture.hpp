@@ -2,8 +2,10 @@
 
 #include <sqlite3.h>
 
+#include <algorithm>
 #include <fstream>
 #include <set>
+#include <sstream>
 
 #include "api/formats/bundle.hpp"
 #include "api/formats/handover.hpp"
@@ -179,6 +181,25 @@ class Bundles : public AppFixture {
     const auto at = text.find(from, text.find('\n'));
     EXPECT_NE(at, std::string::npos) << from << " in " << text.substr(0, 500);
     text.replace(at, from.size(), to);
+    say_again(entries);
+    return zip_of(entries);
+  }
+  /// The bundle with the value (JSON) of a column in a row of a table, counted from 0, made good again.
+  std::string with_cell(const std::string& table, const std::string& column, const Json& value,
+                        std::size_t row = 0) {
+    auto entries = entries_of(bundle());
+    std::istringstream lines(content(entries, "tables/" + table + ".ndjson"));
+    std::string head, line, out;
+    std::getline(lines, head);
+    const auto columns = Json::parse(head);
+    const auto at = std::ranges::find(columns, Json(column)) - columns.begin();
+    EXPECT_LT(at, static_cast<std::ptrdiff_t>(columns.size())) << column;
+    for (std::size_t i = 0; std::getline(lines, line); ++i) {
+      auto cells = Json::parse(line);
+      if (i == row) cells[static_cast<std::size_t>(at)] = value;
+      out += cells.dump() + '\n';
+    }
+    content(entries, "tables/" + table + ".ndjson") = head + '\n' + out;
     say_again(entries);
     return zip_of(entries);
   }

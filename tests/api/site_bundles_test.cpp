@@ -187,6 +187,72 @@ TEST_F(Bundles, WithRowsThatNobodyCouldReadAgainAreRefusedByLineAndColumn) {
   refused(of_site("site", Json(lat_deg).dump(), "1e308"), "origin_lat_deg is not within -90 and 90");
 }
 
+// The same door as REST: what POST /missions, /ranges, /fixes and the others refuse comes in by no bundle.
+TEST_F(Bundles, WithValuesThatRestRefusesAreRefusedByLineAndColumn) {
+  OtherServer other;
+  const auto refused = [&](const std::string& table, const std::string& column, const Json& value) {
+    const auto answer = other.take(with_cell(table, column, value));
+    EXPECT_EQ(answer.status, 422) << table << ' ' << column << ' ' << value << ' ' << answer.body;
+    const auto at = answer.body.find("tables/" + table + ".ndjson line 2: ");
+    EXPECT_NE(at, std::string::npos) << answer.body;
+    EXPECT_NE(answer.body.find(column, std::min(at, answer.body.size())), std::string::npos) << answer.body;
+  };
+  for (const std::string odd : {"a\nb", "a\rb", "a\tb", "a\x1b[2J", "a\x01"}) {
+    refused("mission", "name", odd);
+    refused("mission", "kit", odd);
+    refused("site", "name", odd);
+    refused("anchor", "name", odd);
+    refused("anchor", "asset_tag", odd);
+    refused("exclusion", "reason", odd);
+    refused("revision", "note", odd);
+  }
+  for (const char* table : {"mission", "site"}) refused(table, "name", "   ");
+  refused("mission", "name", std::string(201, 'n'));
+  refused("anchor", "building", std::string(5000, 'n'));
+  refused("site", "base_source", "hearsay");
+  refused("site", "crs_epoch_year", 3000.5);
+  refused("site", "origin_height_m", 1e9);
+  refused("site", "outline_geojson", R"({"type":"Point","coordinates":[1,2]})");
+  for (const int state : {0, 1}) refused("mission", "state", state);
+  for (const double arm_m : {1e9, -101.0}) refused("mission_tag", "lever_arm_up_m", arm_m);
+  for (const double distance_m : {-5.0, 0.0, 1e9}) refused("uwb_range", "distance_m", distance_m);
+  for (const std::int64_t id : {std::int64_t{99'999'999'999}, std::int64_t{-1}, std::int64_t{1} << 32}) {
+    refused("uwb_range", "anchor", id);
+    refused("uwb_range", "tag", id);
+    refused("anchor", "network_id", id);
+    refused("mission_tag", "tag", id);
+  }
+  for (const std::int64_t t_ns : {std::int64_t{-5}, INT64_MAX}) {
+    refused("uwb_range", "t_ns", t_ns);
+    refused("fix", "t_ns", t_ns);
+    refused("mission", "created_t_ns", t_ns);
+  }
+  refused("uwb_range", "antenna", 256);
+  refused("uwb_range", "rx_dbm", -999.0);
+  refused("fix", "lat_deg", nullptr);
+  refused("fix", "height_m", 1e9);
+  refused("fix", "satellites", -1);
+  refused("fix", "cov_ee_m2", -1.0);
+  refused("fix", "enu_from_body_w", 3.5);
+  for (const char* column : {"h95_m", "v95_m", "gdop", "bias_sigma_m"}) refused("estimate", column, -3.0);
+  refused("hypothesis", "probability", 1.5);
+  expect_nothing(other);
+  EXPECT_EQ(other.take(bundle()).status, 201) << "what this server says itself";
+}
+
+TEST_F(Bundles, OfNamesOfManyBytesAndOfRowsThatOnlyDevicesSendAreTaken) {
+  const auto taken = [&](const std::string& table, const std::string& column, const Json& value) {
+    OtherServer other;
+    const auto answer = other.take(with_cell(table, column, value));
+    EXPECT_EQ(answer.status, 201) << table << ' ' << column << ' ' << value << ' ' << answer.body;
+  };
+  std::string emoji;
+  for (int i = 0; i < 200; ++i) emoji += "\xf0\x9f\x9b\xb0";
+  taken("mission", "name", emoji);
+  taken("uwb_range", "distance_m", 420.5);  // a Pozyx radio
+  taken("fix", "correction_age_s", nullptr);
+}
+
 TEST_F(Bundles, OfAPlanThatIsSpoiledInTheDatabaseLeaveListsAndTheWayOutOpen) {
   const auto made = post("/api/v1/plans", R"({"name":"South"})");
   ASSERT_EQ(made.status, 201) << made.body;
