@@ -30,7 +30,7 @@ dpkg-deb --info "$one" conffiles | grep -qx /etc/anchord/anchord.toml ; pass_or_
 dpkg-deb --raw-extract "$one" "$scratch/tree" || exit 1
 tree=$scratch/tree
 doc=$tree/usr/share/doc/anchord
-for file in usr/bin/anchord lib/systemd/system/anchord.service lib/udev/rules.d/60-anchord-pozyx.rules etc/anchord/anchord.toml \
+for file in usr/bin/anchord lib/systemd/system/anchord{,-gateway,-worker}.service lib/udev/rules.d/60-anchord-pozyx.rules etc/anchord/anchord.toml \
   usr/share/man/man1/anchord.1.gz usr/share/bash-completion/completions/anchord usr/share/zsh/vendor-completions/_anchord \
   usr/share/doc/anchord/{copyright,changelog.gz,CHANGELOG.md.gz,operations.md,anchord.spdx.json,licences.txt.gz}; do
   [[ -s $tree/$file ]] ; pass_or_fail $? "/$file is not in the package"
@@ -47,6 +47,18 @@ attempt man --warnings -E UTF-8 -l "$tree/usr/share/man/man1/anchord.1.gz"
 expect "the manual page" 0 'anchord serve'
 attempt "$tree/usr/bin/anchord" config check --config "$tree/etc/anchord/anchord.toml"
 expect "the settings of the package" 0 ''
+# The units of gateway and worker: the sandbox of the server, command lines that anchord reads, off until they are enabled.
+units=$tree/lib/systemd/system
+sandbox() { grep -E '^(NoNew|Capability|Protect|Private|Restrict|Lock|Memory|RemoveIPC|SystemCall|DevicePolicy)' "$units/$1.service"; }
+for unit in anchord-gateway anchord-worker; do
+  [[ $(sandbox $unit) == "$(sandbox anchord)" ]] ; pass_or_fail $? "the sandbox of $unit is another than the server's"
+  ! grep -q "enable.*$unit" "$tree/DEBIAN/postinst" ; pass_or_fail $? "$unit is enabled by the package"
+  file=$(sed -n 's/^EnvironmentFile=//p' "$units/$unit.service") kind=${unit#anchord-}
+  grep -qF "$file" "docs/$kind.md" 2>/dev/null || grep -qF "$file" "docs/${kind}s.md" ; pass_or_fail $? "no page names $file"
+  start=$(sed -n "s|^ExecStart=/usr/bin/anchord \\([a-z]*\\).*|\\1|p" "$units/$unit.service")
+  attempt "$tree/usr/bin/anchord" "$start" --help
+  expect "the command of $unit" 0 "--log-level"
+done
 attempt readelf -S "$tree/usr/bin/anchord"
 [[ $output != *.debug_info* ]] ; pass_or_fail $? "the executable is not stripped"
 
