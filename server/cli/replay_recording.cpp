@@ -7,6 +7,7 @@
 #include <iostream>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <set>
 #include <thread>
 #include <utility>
 
@@ -19,6 +20,7 @@
 #include "drivers/device/replay.hpp"
 #include "server/cli/failed.hpp"
 #include "server/cli/progress.hpp"
+#include "server/cli/replay_missions.hpp"
 #include "server/cli/rest_client.hpp"
 #include "server/cli/row_upload.hpp"
 
@@ -46,12 +48,15 @@ class Missions {
   /// Asks the server, and makes it there.
   Result<MissionId> find(const MissionId& recorded) {
     const auto wanted = target_.mission.empty() ? to_string(recorded) : target_.mission;
-    const auto there = client_.get("/api/v1/missions/" + wanted);
-    if (there) {
-      BOOST_OUTCOME_TRY(const auto uuid, parse_uuid(wanted));
-      return there_[recorded] = MissionId{uuid};
+    const bool unknown = recorded == gateway::unassigned();
+    if (!unknown || !target_.mission.empty()) {
+      const auto there = client_.get("/api/v1/missions/" + wanted);
+      if (there) {
+        BOOST_OUTCOME_TRY(const auto uuid, parse_uuid(wanted));
+        return there_[recorded] = MissionId{uuid};
+      }
+      if (there.error().code != Errc::not_found || !target_.mission.empty()) return there.error();
     }
-    if (there.error().code != Errc::not_found || !target_.mission.empty()) return there.error();
     Mission mission;
     mission.name = target_.name;
     BOOST_OUTCOME_TRY(const auto body, client_.post("/api/v1/missions?devices=false", "application/json",
@@ -59,11 +64,14 @@ class Missions {
                                                     to_string(make_uuid_v7(SystemClock{}.now()))));
     BOOST_OUTCOME_TRY(const auto id, api::parse_created_id(body));
     BOOST_OUTCOME_TRY(const auto uuid, parse_uuid(id));
-    std::fprintf(stderr,
-                 "replay: mission %s of the recording is not on this server: its rows go to the new mission "
-                 "%s without tags and lever arms, which a recording does not contain (use --mission with one "
-                 "that has them)\n",
-                 to_string(recorded).c_str(), id.c_str());
+    const std::string what =
+        unknown ? "the rows were recorded before a mission was known: they"
+                : "mission " + to_string(recorded) + " of the recording is not on this server: its rows";
+    std::fprintf(
+        stderr,
+        "replay: %s go to the new mission %s without tags and lever arms, which a recording does not "
+        "contain (use --mission with one that has them)\n",
+        what.c_str(), id.c_str());
     made_.push_back(id);
     return there_[recorded] = MissionId{uuid};
   }
@@ -111,7 +119,8 @@ class Player {
                  static_cast<unsigned long long>(answers.known),
                  static_cast<unsigned long long>(answers.refused));
     for (const auto* first : {&answers.first_error_fixes, &answers.first_error_ranges}) {
-      if (!first->empty()) std::fprintf(stderr, "anchord replay: first rejected: %s\n", first->c_str());
+      if (!first->empty())
+        std::fprintf(stderr, "anchord replay: first rejected: %s\n", printable(*first).c_str());
     }
     return answers.refused == 0;
   }
@@ -172,11 +181,33 @@ void report(const device::ReplaySummary& s) {
 bool kept(const MissionId& mission) { return mission != MissionId{}; }
 
 template <class Take>
+Result<device::ReplaySummary> each_row(const std::string& file, Take take) {
+  const auto of_kind = [&](auto row) -> Result<void> {
+    return kept(row.mission) ? take(std::move(row)) : boost::outcome_v2::success();
+  };
+  return device::replay(
+      file, {[&](const Fix& row) { return of_kind(row); }, [&](const Range& row) { return of_kind(row); }});
+}
+
+/// Read twice: what a recording names last says of which mission its first rows are.
+template <class Take>
 Result<void> run(const std::string& file, Take take) {
-  const device::ReplayRows rows{
-      [&](const Fix& row) { return kept(row.mission) ? take(row) : boost::outcome_v2::success(); },
-      [&](const Range& row) { return kept(row.mission) ? take(row) : boost::outcome_v2::success(); }};
-  BOOST_OUTCOME_TRY(const auto done, device::replay(file, rows));
+  ReplayMissions missions;
+  BOOST_OUTCOME_TRYV(each_row(file, [&](const auto& row) -> Result<void> {
+    missions.note(row.mission);
+    return interrupted() ? Result<void>(make_error(Errc::canceled, "stopped")) : boost::outcome_v2::success();
+  }));
+  std::set<MissionId> told;
+  BOOST_OUTCOME_TRY(
+      const auto done, each_row(file, [&](auto row) -> Result<void> {
+        const MissionId recorded = std::exchange(row.mission, missions.of(row.mission));
+        if (row.mission != recorded && told.insert(row.mission).second)
+          std::fprintf(stderr,
+                       "replay: rows recorded before a mission was known go to mission %s, the first one "
+                       "that the recording names afterwards\n",
+                       to_string(row.mission).c_str());
+        return take(std::move(row));
+      }));
   report(done);
   return boost::outcome_v2::success();
 }

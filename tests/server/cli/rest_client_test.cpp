@@ -1,6 +1,7 @@
 #include "server/cli/rest_client.hpp"
 
 #include "api/measurements/flight_requests.hpp"
+#include "server/cli/replay_missions.hpp"
 #include "tests/server/app/app_fixture.hpp"
 
 namespace anchord::test::rest_client_test {
@@ -45,6 +46,22 @@ TEST_F(RestClientTest, TakesAnotherRefusalForAnError) {
   const auto wrong = client_->post("/api/v1/missions", "application/json", R"({"name":"m","frame":"mars"})");
   ASSERT_FALSE(wrong);
   EXPECT_NE(wrong.error().message.find("422"), std::string::npos) << wrong.error().message;
+}
+
+// A gateway that starts without a server records under a marker until it knows the mission.
+TEST(ReplayMissions, RowsFromBeforeAMissionWasKnownAreOfTheFirstOneNamedAfterwards) {
+  const auto mission = [](std::uint8_t n) {
+    MissionId id;
+    id.uuid.bytes[15] = n;
+    return id;
+  };
+  const MissionId none = gateway::unassigned(), a = mission(1), b = mission(2);
+  const std::vector<MissionId> recorded{none, none, a, a, none, b, none};
+  cli::ReplayMissions missions;
+  for (const auto& id : recorded) missions.note(id);
+  std::vector<MissionId> rows;
+  for (const auto& id : recorded) rows.push_back(missions.of(id));
+  EXPECT_EQ(rows, (std::vector<MissionId>{a, a, a, a, b, b, none})) << "nothing is named after the last";
 }
 
 }  // namespace
