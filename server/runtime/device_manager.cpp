@@ -13,6 +13,7 @@
 #include "core/base/guard.hpp"
 #include "core/base/locked.hpp"
 #include "core/base/retry.hpp"
+#include "core/base/steady.hpp"
 #include "core/base/text.hpp"
 #include "drivers/device/device_loop.hpp"
 #include "drivers/device/discover.hpp"
@@ -21,6 +22,7 @@
 #include "server/runtime/device_alarms.hpp"
 #include "server/runtime/device_file.hpp"
 #include "server/runtime/device_metrics.hpp"
+#include "server/runtime/device_news.hpp"
 #include "server/runtime/device_secrets.hpp"
 #include "server/runtime/row_queue.hpp"
 
@@ -231,7 +233,8 @@ class DeviceManager::Impl final : public device::DeviceListener {
     const auto text = "device \"" + state->settings.name + "\" is " + std::string(to_string(state->phase)) +
                       (state->reason.empty() ? "" : ": " + state->reason);
     // It also comes when the device says who it is: the same news twice is none.
-    if (auto& told = told_[id]; std::exchange(told, text) != text) note(text);
+    const bool works = state->phase == device::Phase::talking;
+    if (const auto line = told_[id].line(text, works, system_steady_clock().now())) note(*line);
   }
   void answer(const std::string&, std::uint64_t command, const Result<std::string>& json) override {
     auto answers = answers_.lock();
@@ -334,8 +337,8 @@ class DeviceManager::Impl final : public device::DeviceListener {
   boost::asio::executor_work_guard<boost::asio::io_context::executor_type> work_;
   std::unique_ptr<record::Recorder> recorder_;
   std::unique_ptr<device::DeviceLoop> loop_;
-  std::map<std::string, std::string> told_;  ///< newest line of the log, by device
-  DeviceBatch arrived_;                      ///< of the io thread
+  std::map<std::string, DeviceNews> told_;  ///< in the log, by device
+  DeviceBatch arrived_;                     ///< of the io thread
   boost::asio::steady_timer hand_on_{io_};
   Thread io_thread_, writer_;
   RowQueue unstored_;

@@ -4,6 +4,7 @@
 
 #include <fstream>
 
+#include "server/runtime/device_news.hpp"
 #include "tests/scratch_dir.hpp"
 
 namespace anchord::server::device_alarms_test {
@@ -38,6 +39,34 @@ TEST(DeviceAlarms, EachDeviceThatSendsTooManyIdsOrWhoseBaseMovedIsNamed) {
   EXPECT_EQ(moved_bases(devices), "");
   devices[0].moved_base = "its base moved";
   EXPECT_EQ(moved_bases(devices), "device \"a\": its base moved");
+}
+
+TEST(DeviceNews, OfADeviceThatIsNotThereAreALineOfEachKindAndThenOneInTenMinutesWithTheirNumber) {
+  DeviceNews news;
+  std::vector<std::string> log;
+  // Every 3.5 s it is found and lost again, for half an hour.
+  for (std::int64_t ms = 0; ms < 1'800'000; ms += 1750) {
+    const std::string text = ms % 3500 == 0 ? "is lost: refused" : "is found: refused";
+    if (const auto line = news.line(text, false, {ms * 1'000'000})) log.push_back(*line);
+  }
+  ASSERT_EQ(log.size(), 4U);
+  EXPECT_EQ(log[0], "is lost: refused");
+  EXPECT_EQ(log[1], "is found: refused");
+  EXPECT_EQ(log[2], "is lost: refused (172 times since this was last logged)");
+  EXPECT_EQ(log[3], "is found: refused (343 times since this was last logged)");
+}
+
+TEST(DeviceNews, OfADeviceThatWorkedForAMinuteAreNewAgain) {
+  DeviceNews news;
+  const auto at = [](std::int64_t s) { return SteadyTime{s * 1'000'000'000}; };
+  EXPECT_TRUE(news.line("is talking", true, at(0)));
+  EXPECT_FALSE(news.line("is talking", true, at(1))) << "the same twice";
+  EXPECT_TRUE(news.line("is lost: pulled", false, at(5)));
+  EXPECT_FALSE(news.line("is talking", true, at(7)));
+  EXPECT_FALSE(news.line("is lost: pulled", false, at(30))) << "it worked for less than a minute";
+  EXPECT_FALSE(news.line("is talking", true, at(40)));
+  EXPECT_TRUE(news.line("is lost: pulled", false, at(101)));
+  EXPECT_TRUE(news.line("is talking", true, at(102)));
 }
 
 }  // namespace
