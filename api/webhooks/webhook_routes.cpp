@@ -136,6 +136,18 @@ Webhook path_webhook(WebhookApi& s, const Request& request) {
   return value_or_problem(s.store.webhook(path_id<WebhookId>(request)));
 }
 
+/// For the audit log: user info and query are where keys of receivers stand, and what is there is never
+/// deleted.
+std::string without_keys(const std::string& url) {
+  const auto scheme = url.find("://");
+  const auto host = scheme == std::string::npos ? 0 : scheme + 3;
+  std::string shown = url.substr(0, url.find_first_of("?#", host));
+  const auto path = std::min(shown.find('/', host), shown.size());
+  if (const auto user = shown.rfind('@', path); user != std::string::npos && user >= host && user < path)
+    shown.erase(host, user + 1 - host);
+  return shown;
+}
+
 Response create(WebhookApi& s, const Request& request) {
   check_query(request, {});
   if (s.post == nullptr) throw_problem(422, "unsupported", "this server sends no webhooks");
@@ -149,7 +161,7 @@ Response create(WebhookApi& s, const Request& request) {
   if (webhook.kind == WebhookKind::cloud_event) webhook.secret = make_webhook_secret();
   value_or_problem(s.store.insert(webhook));
   s.service.changed();
-  s.audit(request, "webhook.create " + to_string(webhook.id) + ' ' + webhook.url);
+  s.audit(request, "webhook.create " + to_string(webhook.id) + ' ' + without_keys(webhook.url));
   Ordered body = webhook_json(s, webhook);
   body["secret"] = text_or_null(webhook.secret);
   Response response = json_response(201, body);
@@ -164,7 +176,7 @@ Response patch(WebhookApi& s, const Request& request) {
   read(s, json_body(request), webhook, false);
   value_or_problem(s.store.update(webhook, webhook.version));
   s.service.changed();
-  s.audit(request, "webhook.change " + to_string(webhook.id) + ' ' + webhook.url);
+  s.audit(request, "webhook.change " + to_string(webhook.id) + ' ' + without_keys(webhook.url));
   return answer(s, 200, path_webhook(s, request));
 }
 
@@ -174,7 +186,7 @@ Response remove(WebhookApi& s, const Request& request) {
   require_match(request, etag(webhook));
   value_or_problem(s.store.remove(webhook.id));
   s.service.changed();
-  s.audit(request, "webhook.delete " + to_string(webhook.id) + ' ' + webhook.url);
+  s.audit(request, "webhook.delete " + to_string(webhook.id) + ' ' + without_keys(webhook.url));
   Response response;
   response.status = 204;
   return response;

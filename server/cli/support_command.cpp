@@ -1,3 +1,5 @@
+#include <sys/stat.h>
+
 #include <CLI/CLI.hpp>
 #include <cstdio>
 
@@ -46,6 +48,16 @@ std::string from_here(const SupportOptions& options) {
       SystemClock().now());
 }
 
+/// What is in it is for whoever asked, also where a file of this name could be read by others.
+Result<void> write_private(const std::filesystem::path& file, std::string_view text) {
+  umask(077);
+  std::error_code none;
+  if (std::filesystem::is_regular_file(file, none))
+    std::filesystem::permissions(
+        file, std::filesystem::perms::owner_read | std::filesystem::perms::owner_write, none);
+  return write_whole(file, text);
+}
+
 }  // namespace
 
 void add_support_command(CLI::App& app, int& exit_code) {
@@ -64,7 +76,7 @@ void add_support_command(CLI::App& app, int& exit_code) {
       exit_code = 1;
       return;
     }
-    const auto written = write_whole(options->out, served ? served->value() : from_here(*options));
+    const auto written = write_private(options->out, served ? served->value() : from_here(*options));
     if (!written) {
       exit_code =
           failed("anchord support-bundle", written.error().message + "; give another file with --out");

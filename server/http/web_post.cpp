@@ -24,6 +24,28 @@ using Steady = std::chrono::steady_clock;
 constexpr auto k_whole = std::chrono::seconds(20);  ///< of one exchange
 constexpr auto k_step = std::chrono::seconds(5);    ///< of one connect, read or write
 
+/// The library has one word for each, which says little to who reads why a delivery failed.
+const char* in_words(httplib::Error error) {
+  switch (error) {
+    case httplib::Error::Connection:
+      return "no connection: refused, or no way there";
+    case httplib::Error::ConnectionTimeout:
+      return "no connection within 5 s";
+    case httplib::Error::Read:
+      return "connected, and then no answer within 5 s, or the connection was closed";
+    case httplib::Error::Write:
+      return "the connection was closed before all was sent";
+    case httplib::Error::SSLConnection:
+      return "no TLS connection: does TLS run there?";
+    case httplib::Error::SSLLoadingCerts:
+      return "no TLS connection: the certificates of this machine cannot be read";
+    case httplib::Error::SSLServerVerification:
+      return "its certificate is not for this name, or nobody whom this machine trusts signed it";
+    default:
+      return "the exchange failed";
+  }
+}
+
 struct Url {
   bool tls{};
   std::string host, path;
@@ -172,8 +194,8 @@ class HttpPost final : public WebPost {
     if (answer.status != 0) return answer;  // perhaps its body was cut off
     if (stopped) return make_error(Errc::canceled, "the server is stopping");
     if (const auto why = watch.why(); !why.empty()) return make_error(Errc::link_lost, url.host + " " + why);
-    return make_error(Errc::link_lost, "no answer from " + url.host + " (" + pinned +
-                                           "): " + httplib::to_string(result.error()));
+    return make_error(Errc::link_lost,
+                      "no answer from " + url.host + " (" + pinned + "): " + in_words(result.error()));
   }
 
   bool enter(httplib::Client* client) {

@@ -318,6 +318,20 @@ TEST_F(Webhooks, TheSecretIsToldOnceAndChangesNeedTheNewestVersion) {
   EXPECT_EQ(get(path).status, 404);
 }
 
+TEST_F(Webhooks, AreInTheAuditLogWithoutWhatMayBeAKeyOfTheirUrl) {
+  const Json made = hook("https://a.example:8443/hook/in?token=abcdef&x=1");
+  const auto path = "/api/v1/webhooks/" + made["id"].get<std::string>();
+  Call change;
+  change.headers["if-match"] = "*";
+  EXPECT_EQ(call(Method::patch, path, R"({"url":"https://a.example/other?token=ghijkl"})", change).status,
+            200);
+  EXPECT_EQ(call(Method::del, path, "", change).status, 204);
+  const auto log = get("/api/v1/audit").body;
+  EXPECT_NE(log.find("https://a.example:8443/hook/in"), std::string::npos) << log;
+  EXPECT_NE(log.find("https://a.example/other"), std::string::npos) << log;
+  for (const char* key : {"token=", "abcdef", "ghijkl"}) EXPECT_EQ(log.find(key), std::string::npos) << log;
+}
+
 TEST_F(Webhooks, AreForIntegratorsAndAdministrators) {
   std::size_t n = 0;
   for (const auto& route : app_->router().routes()) {

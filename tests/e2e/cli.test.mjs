@@ -202,6 +202,7 @@ test('a support bundle has what helps and no secret of the server', async () => 
     );
     const { code, stderr } = await run(['support-bundle', '--data-dir', server.dataDir, '--out', archive]);
     assert.equal(code, 0, stderr);
+    assert.equal(statSync(archive).mode & 0o777, 0o600, 'it is for whoever asked');
     const bundle = readFileSync(archive, 'latin1');
     for (const secret of secrets) assert.ok(!bundle.includes(secret), 'a secret is in the bundle');
     const part = (name) => execFileSync('tar', ['-xOf', archive, name], { encoding: 'utf8' });

@@ -80,6 +80,24 @@ TEST(WebPost, AHeadThatNeverEndsIsCutOffBeforeItFillsTheMemory) {
   EXPECT_LT(receiver.taken(), 100u << 20);
 }
 
+TEST(WebPost, SaysInWordsThatNobodyListens) {
+  const int bound = ::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);  // and nobody listens
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  socklen_t size = sizeof address;
+  ASSERT_EQ(::bind(bound, reinterpret_cast<const sockaddr*>(&address), sizeof address), 0);
+  ::getsockname(bound, reinterpret_cast<sockaddr*>(&address), &size);
+  WebPost::Message message;
+  message.method = "POST";
+  message.url = "http://127.0.0.1:" + std::to_string(ntohs(address.sin_port)) + "/hook?token=abcdef";
+  const auto answer = make_web_post(true)->send(message);
+  ::close(bound);
+  ASSERT_FALSE(answer);
+  EXPECT_EQ(answer.error().message,
+            "no answer from 127.0.0.1 (127.0.0.1): no connection: refused, or no way there");
+}
+
 TEST(WebPost, ABodyThatNeverEndsIsCutOffAndTheStatusCounts) {
   RogueReceiver receiver("HTTP/1.1 204 No Content\r\nX-A: b\r\nContent-Length: 99999999999\r\n\r\n",
                          std::string(8192, 'y'));
