@@ -11,6 +11,7 @@
 #include "server/cli/progress.hpp"
 #include "server/cli/rest_json.hpp"
 #include "server/cli/server_address.hpp"
+#include "server/cli/terminal_text.hpp"
 #include "server/runtime/backup_keeper.hpp"
 #include "server/storage/data_folder.hpp"
 #include "server/storage/postgres_database.hpp"
@@ -63,7 +64,7 @@ std::optional<int> through_server(const BackupOptions& options) {
                   2);
   const auto made = made_by(*client.value());
   if (!made) return failed("anchord", made.error().message);
-  std::printf("%s\n", to_wire(made.value()).c_str());
+  std::printf("%s\n", printable_json(to_wire(made.value())).c_str());
   return report_missing(made.value().value("name", ""),
                         made.value().value("cir_missing", std::vector<std::string>{}));
 }

@@ -9,6 +9,7 @@
 #include "server/cli/commands.hpp"
 #include "server/cli/failed.hpp"
 #include "server/cli/learning_data.hpp"
+#include "server/cli/terminal_text.hpp"
 #include "server/cli/words.hpp"
 
 namespace anchord::cli {
@@ -54,8 +55,8 @@ void print_report(const api::CampaignReport& r, std::FILE* to) {
   for (const auto& warning : r.warnings) std::fprintf(to, "  warning: %s\n", printable(warning).c_str());
   for (const auto& odd : r.oddities) std::fprintf(to, "  warning: %s\n", printable(odd).c_str());
   for (const auto& s : r.sites)
-    std::fprintf(to, "  %-24s %6zu kept, %zu zero, %zu outliers, median %.3f m, sd %.3f m\n", s.name.c_str(),
-                 s.kept, s.zero, s.outliers, s.median_m, s.sd_m);
+    std::fprintf(to, "  %-24s %6zu kept, %zu zero, %zu outliers, median %.3f m, sd %.3f m\n",
+                 one_line(s.name).c_str(), s.kept, s.zero, s.outliers, s.median_m, s.sd_m);
 }
 
 int import(const CampaignArguments& a) {

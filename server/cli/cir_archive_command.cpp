@@ -58,7 +58,7 @@ void print(const Json& items) {
 
 int show(const CirArchiveOptions& options, const Json& items) {
   if (options.json)
-    std::printf("%s\n", to_wire(items, 1).c_str());
+    std::printf("%s\n", printable_json(to_wire(items, 1)).c_str());
   else if (items.empty())
     std::printf("no flight has impulse responses in a file\n");
   else

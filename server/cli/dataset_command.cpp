@@ -27,7 +27,7 @@ struct DatasetArguments {
 };
 
 void print_set(const api::FrozenDataset& set, const std::string& digest) {
-  std::printf("digest %s\n%s", digest.c_str(), api::split_report_text(set).c_str());
+  std::printf("digest %s\n%s", digest.c_str(), printable(api::split_report_text(set)).c_str());
 }
 
 /// What the columns were taken for, and what of the table was not used.

@@ -10,6 +10,7 @@
 #include "server/cli/commands.hpp"
 #include "server/cli/failed.hpp"
 #include "server/cli/server_address.hpp"
+#include "server/cli/terminal_text.hpp"
 #include "server/config/toml_json.hpp"
 #include "server/http/http_client.hpp"
 
@@ -85,24 +86,26 @@ Result<Ordered> find(Server& server, const std::string& word) {
   return hits.front();
 }
 
+std::string shown(const Ordered& object, const char* key) { return one_line(text(object, key)); }
+
 void print_device(const Ordered& d) {
-  std::string state = text(d, "state");
   const auto dropped = d.value("dropped", Ordered::object());
   std::uint64_t n = 0;
   for (const auto& [reason, count] : dropped.items()) n += count.get<std::uint64_t>();
-  std::printf("%s  %-6s %-16s %-8s %6.1f/s  %s\n", text(d, "id").c_str(), text(d, "kind").c_str(),
-              text(d, "name").c_str(), state.c_str(), d.value("rate_hz", 0.0), text(d, "address").c_str());
+  std::printf("%s  %-6s %-16s %-8s %6.1f/s  %s\n", shown(d, "id").c_str(), shown(d, "kind").c_str(),
+              shown(d, "name").c_str(), shown(d, "state").c_str(), d.value("rate_hz", 0.0),
+              shown(d, "address").c_str());
   for (const char* key : {"reason", "conflict"}) {
-    if (!text(d, key).empty()) std::printf("    %s\n", text(d, key).c_str());
+    if (!text(d, key).empty()) std::printf("    %s\n", shown(d, key).c_str());
   }
-  if (n > 0) std::printf("    not used: %s\n", to_wire(dropped).c_str());
+  if (n > 0) std::printf("    not used: %s\n", printable_json(to_wire(dropped)).c_str());
 }
 
 int show(const DevicesOptions& options, const Result<Ordered>& list, const char* none,
          void (*print)(const Ordered&)) {
   if (!list) return failed("anchord devices", list.error().message);
   if (options.json) {
-    std::printf("%s\n", to_wire(list.value(), 1).c_str());
+    std::printf("%s\n", printable_json(to_wire(list.value(), 1)).c_str());
     return 0;
   }
   for (const auto& item : list.value()) print(item);
@@ -123,9 +126,9 @@ int discover(const DevicesOptions& options, Server& server) {
     return failed("anchord devices", "the discovery takes longer than 20 s: run the command again");
   const char* none = "no unused serial port was found; a network device is added by its address";
   return show(options, found.value()["items"], none, [](const Ordered& d) {
-    const auto kind = text(d, "kind");
-    std::printf("%-6s %s\n    %s\n", kind.empty() ? "?" : kind.c_str(), text(d, "address").c_str(),
-                text(d, "evidence").c_str());
+    const auto kind = shown(d, "kind");
+    std::printf("%-6s %s\n    %s\n", kind.empty() ? "?" : kind.c_str(), shown(d, "address").c_str(),
+                shown(d, "evidence").c_str());
   });
 }
 
@@ -177,7 +180,7 @@ int add(const DevicesOptions& options, Server& server) {
   body.value()["name"] = options.name.empty() ? options.kind : options.name;
   const auto made = server.call("POST", "/api/v1/devices", to_wire(body.value()));
   if (!made) return failed("anchord devices", made.error().message);
-  std::printf("%s\n", text(made.value(), "id").c_str());
+  std::printf("%s\n", shown(made.value(), "id").c_str());
   return 0;
 }
 
@@ -185,7 +188,7 @@ int settings(const DevicesOptions& options, Server& server) {
   const auto device = find(server, options.device);
   if (!device) return failed("anchord devices", device.error().message);
   if (options.settings.empty()) {
-    std::printf("%s\n", to_wire(device.value(), 1).c_str());
+    std::printf("%s\n", printable_json(to_wire(device.value(), 1)).c_str());
     return 0;
   }
   const auto patch = patch_of(options.settings);
@@ -218,7 +221,7 @@ int act(const DevicesOptions& options, Server& server) {
   const auto done =
       server.call("POST", "/api/v1/devices/" + text(device.value(), "id") + "/actions", to_wire(body));
   if (!done) return failed("anchord devices", done.error().message);
-  std::printf("%s\n", to_wire(done.value().value("result", Ordered()), 1).c_str());
+  std::printf("%s\n", printable_json(to_wire(done.value().value("result", Ordered()), 1)).c_str());
   return 0;
 }
 

@@ -8,6 +8,7 @@
 #include "server/cli/commands.hpp"
 #include "server/cli/config_flags.hpp"
 #include "server/cli/doctor.hpp"
+#include "server/cli/terminal_text.hpp"
 
 namespace anchord::cli {
 namespace {
@@ -48,7 +49,7 @@ void add_doctor_command(CLI::App& app, int& exit_code) {
   command->callback([&exit_code, options, json] {
     const auto findings = examine(*options);
     if (*json)
-      std::printf("%s\n", findings_json(findings).c_str());
+      std::printf("%s\n", printable_json(findings_json(findings)).c_str());
     else
       print(findings);
     exit_code =

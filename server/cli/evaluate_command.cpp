@@ -3,8 +3,10 @@
 #include <memory>
 
 #include "api/learning/labelled_dataset.hpp"
+#include "core/base/text.hpp"
 #include "server/cli/commands.hpp"
 #include "server/cli/learning_data.hpp"
+#include "server/cli/terminal_text.hpp"
 
 namespace anchord::cli {
 namespace {
@@ -55,7 +57,7 @@ int evaluate(const EvaluateArguments& a) {
   report.used = evaluation.rows;
   const auto out = a.json ? api::evaluation_json(evaluation, model.value(), report)
                           : api::evaluation_text(evaluation, model.value(), report);
-  std::fputs(out.c_str(), stdout);
+  std::fputs((a.json ? printable_json(out) : printable(out)).c_str(), stdout);
   return 0;
 }
 

@@ -13,6 +13,7 @@
 #include "core/geo/enu.hpp"
 #include "core/geo/frame_fit.hpp"
 #include "server/cli/commands.hpp"
+#include "server/cli/terminal_text.hpp"
 
 namespace anchord::cli {
 namespace {
@@ -91,7 +92,7 @@ void print(const Pairs& pairs, const FrameFit& fit) {
   for (std::size_t i = 0; i < pairs.pairs.size(); ++i) {
     const auto& r = fit.residuals[i];
     const std::string name = pairs.pairs[i].name.empty() ? std::to_string(i + 1) : pairs.pairs[i].name;
-    std::printf("%-16s %9.4f %9.4f %9.4f   ", name.c_str(), r.residual_m.x(), r.residual_m.y(),
+    std::printf("%-16s %9.4f %9.4f %9.4f   ", one_line(name).c_str(), r.residual_m.x(), r.residual_m.y(),
                 r.residual_m.z());
     if (r.left_out_m)
       std::printf("%.4f m\n", r.left_out_m->norm());

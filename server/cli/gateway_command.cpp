@@ -11,6 +11,7 @@
 #include "server/cli/failed.hpp"
 #include "server/cli/server_address.hpp"
 #include "server/cli/signals.hpp"
+#include "server/cli/terminal_text.hpp"
 #include "server/gateway/gateway.hpp"
 #include "server/http/http_client.hpp"
 #include "server/runtime/logging.hpp"
@@ -118,7 +119,7 @@ int status(const GatewayOptions& options) {
   if (answer.value().status != 200 || !json.is_object() || !json.contains("outbox"))
     return failed("anchord gateway", *url + " is not a gateway: give the --data-dir of the gateway", 1);
   if (options.json)
-    std::printf("%s\n", answer.value().body.c_str());
+    std::printf("%s\n", printable_json(answer.value().body).c_str());
   else
     print_status(json);
   return json.value("alarms", Json::array()).empty() ? 0 : 1;

@@ -12,6 +12,7 @@
 #include "core/base/text.hpp"
 #include "server/cli/commands.hpp"
 #include "server/cli/learning_data.hpp"
+#include "server/cli/terminal_text.hpp"
 
 namespace anchord::cli {
 namespace {
@@ -33,7 +34,8 @@ int list(const ModelsArguments& a) {
   std::vector<api::NamedModel> models;
   for (const auto& path : paths)  // other JSON files in the folder are none of ours
     if (auto model = read_model_file(path)) models.push_back({path, std::move(model).value()});
-  std::fputs((a.json ? api::models_json(models) : api::models_text(models)).c_str(), stdout);
+  const auto out = a.json ? printable_json(api::models_json(models)) : printable(api::models_text(models));
+  std::fputs(out.c_str(), stdout);
   return 0;
 }
 
@@ -44,9 +46,9 @@ int show(const ModelsArguments& a) {
     if (!model) return refuse("models", model.error().message);
     models.push_back({path, std::move(model).value()});
   }
-  std::string out = a.json ? api::models_json(models) : std::string{};
+  std::string out = a.json ? printable_json(api::models_json(models)) : std::string{};
   if (!a.json)
-    for (const auto& one : models) out += api::model_text(one);
+    for (const auto& one : models) out += printable(api::model_text(one));
   std::fputs(out.c_str(), stdout);
   return 0;
 }

@@ -14,6 +14,7 @@
 #include "core/base/text.hpp"
 #include "core/planning/local_plan.hpp"
 #include "server/cli/commands.hpp"
+#include "server/cli/terminal_text.hpp"
 #include "server/cli/words.hpp"
 
 namespace anchord::cli {
@@ -58,7 +59,7 @@ int plan_next(const std::string& path, bool json) {
   }
   const auto out =
       json ? api::decision_json(decision.value(), *request) : api::decision_text(decision.value(), *request);
-  std::fputs(out.c_str(), stdout);
+  std::fputs((json ? printable_json(out) : printable(out)).c_str(), stdout);
   return decision.value().chosen ? 0 : 1;
 }
 

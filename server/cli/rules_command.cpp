@@ -5,8 +5,10 @@
 
 #include "api/formats/rule_samples.hpp"
 #include "api/learning/rule_report.hpp"
+#include "core/base/text.hpp"
 #include "server/cli/commands.hpp"
 #include "server/cli/learning_data.hpp"
+#include "server/cli/terminal_text.hpp"
 
 namespace anchord::cli {
 namespace {
@@ -43,7 +45,8 @@ int rules(const RulesArguments& a) {
     if (!report) return refuse("rules", report.error().message);
     reports.push_back(std::move(report).value());
   }
-  std::fputs((a.json ? api::rules_json(reports) : api::rules_text(reports)).c_str(), stdout);
+  const auto out = a.json ? printable_json(api::rules_json(reports)) : printable(api::rules_text(reports));
+  std::fputs(out.c_str(), stdout);
   return 0;
 }
 

@@ -105,8 +105,8 @@ Result<std::vector<FlightData>> read_all(const Arguments& a) {
     return make_error(Errc::invalid_argument, "give a flight folder, or --track and --ranges");
   if (a.foreign.given()) {
     BOOST_OUTCOME_TRY(auto flight, read_foreign_source(a.foreign));
-    std::fprintf(stderr, "%s: %zu positions, %zu ranges\n", flight.mission.name.c_str(), flight.fixes.size(),
-                 flight.ranges.size());
+    std::fprintf(stderr, "%s: %zu positions, %zu ranges\n", printable(flight.mission.name).c_str(),
+                 flight.fixes.size(), flight.ranges.size());
     for (const auto& note : flight.notes) std::fprintf(stderr, "note: %s\n", printable(note).c_str());
     flights.push_back(std::move(flight));
   }
@@ -205,7 +205,7 @@ int solve(const Arguments& a) {
     if (models.value().empty()) continue;
     solved.back().models = &models.value()[i];
     if (!models.value()[i].used)
-      std::fprintf(stderr, "note: %s: %s\n", flights.value()[i].mission.name.c_str(),
+      std::fprintf(stderr, "note: %s: %s\n", printable(flights.value()[i].mission.name).c_str(),
                    flights.value()[i].notes.back().c_str());
   }
   for (std::size_t i = 0; i < solved.size() && !a.report.file.empty(); ++i) {
@@ -228,7 +228,8 @@ int solve(const Arguments& a) {
   int exit_code = 0;
   for (const auto& solution : solutions.value()) {
     if (solution.placed) continue;
-    std::fprintf(stderr, "anchord: %s: %s\n", solution.name.c_str(), solution.notes.front().c_str());
+    std::fprintf(stderr, "anchord: %s: %s\n", printable(solution.name).c_str(),
+                 printable(solution.notes.front()).c_str());
     exit_code = k_unusable;
   }
   return exit_code;
@@ -253,14 +254,14 @@ int fit_profile(const Arguments& a) {
   if (!solutions) return complain(solutions.error());
   for (const auto& solution : solutions.value()) {
     for (const auto& note : solution.notes)
-      std::fprintf(stderr, "note: %s: %s\n", solution.name.c_str(), note.c_str());
+      std::fprintf(stderr, "note: %s: %s\n", printable(solution.name).c_str(), printable(note).c_str());
     if (!solution.placed)
       return complain(make_error(Errc::too_few_observations, solution.name + ": " + solution.notes.front()));
   }
   // It may be the profile of flights before, which are not at hand any more.
   if (const auto written = write_whole(a.out, kit_profile_json(profile)); !written)
     return failed("anchord profile", written.error().message);
-  std::fprintf(stderr, "profile of kit %s from %zu flights in %s\n", profile.kit.c_str(),
+  std::fprintf(stderr, "profile of kit %s from %zu flights in %s\n", printable(profile.kit).c_str(),
                profile.factors.size(), a.out.c_str());
   return 0;
 }
@@ -272,8 +273,9 @@ int show_profile(const std::string& file) {
   const BiasGate gate = bias_gate(profile.value().factors, options);
   const SharedPrior prior = profile_prior(profile.value().factors, gate, options);
   const auto sigma = prior_sigmas(prior);
-  std::printf("kit %s, %zu flights\n", profile.value().kit.c_str(), profile.value().factors.size());
-  for (const auto& factor : profile.value().factors) std::printf("  %s\n", factor.flight.c_str());
+  std::printf("kit %s, %zu flights\n", printable(profile.value().kit).c_str(),
+              profile.value().factors.size());
+  for (const auto& factor : profile.value().factors) std::printf("  %s\n", printable(factor.flight).c_str());
   std::printf("bias %.3f m (sigma %.3f), %s (z %.1f, limit %.1f)\n", gate.bias_m, gate.sigma_m,
               !gate.known       ? "not determined"
               : gate.calibrated ? "treated as calibrated"

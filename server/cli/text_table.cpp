@@ -101,17 +101,36 @@ std::string line_of(const std::vector<std::string>& cells, const std::vector<std
 }  // namespace
 
 std::string one_line(std::string_view text) {
-  std::string clean = printable(text);
-  std::ranges::replace_if(
-      clean, [](char c) { return c == '\n' || c == '\t'; }, ' ');
-  std::string out;
-  for (std::size_t at = 0; at < clean.size();) {
-    const auto c = first_of(std::string_view(clean).substr(at));
+  const std::string utf8 = to_utf8(text);
+  std::string seen;  // "?" is shorter in a table than the code that printable() makes
+  for (std::size_t at = 0; at < utf8.size();) {
+    const auto c = first_of(std::string_view(utf8).substr(at));
     if (in(k_unseen, c.code))
-      out += '?';
+      seen += '?';
     else
-      out += clean.substr(at, c.bytes);
+      seen += utf8.substr(at, c.bytes);
     at += c.bytes;
+  }
+  std::string out = printable(seen);
+  std::ranges::replace_if(
+      out, [](char c) { return c == '\n' || c == '\t'; }, ' ');
+  return out;
+}
+
+std::string printable_json(std::string_view json) {
+  const std::string utf8 = to_utf8(json);
+  std::string out;
+  out.reserve(utf8.size());
+  for (std::size_t at = 0; at < utf8.size();) {
+    const auto character =
+        std::string_view(utf8).substr(at, first_of(std::string_view(utf8).substr(at)).bytes);
+    at += character.size();
+    if (character.size() == 1)  // what is laid out between values stays
+      out += character;
+    else if (const auto escaped = json_text(character); escaped.size() > 6)
+      out += escaped.substr(1, escaped.size() - 2);
+    else
+      out += character;
   }
   return out;
 }

@@ -5,12 +5,10 @@
 #include <string_view>
 #include <vector>
 
+#include "server/cli/terminal_text.hpp"
+
 /// Tables of plain text for a terminal. Pure; any thread.
 namespace anchord::cli {
-
-/// Text of a stranger as one line that moves no terminal: as printable(), line ends and tabs as spaces, and
-/// what turns the direction of writing or cannot be seen (bidi controls, zero-width spaces) as "?".
-std::string one_line(std::string_view text);
 
 /// Columns of a terminal that UTF-8 text takes: 2 for the wide characters of East Asia and pictures, 0 for
 /// combining marks. Close to what terminals do; who writes to one also turns its line wrap off.

@@ -10,6 +10,7 @@
 #include "server/cli/config_flags.hpp"
 #include "server/cli/failed.hpp"
 #include "server/cli/server_address.hpp"
+#include "server/cli/terminal_text.hpp"
 #include "server/http/http_client.hpp"
 #include "server/runtime/logging.hpp"
 #include "server/storage/data_folder.hpp"
@@ -51,7 +52,7 @@ int through_server(const TokenOptions& options, const std::string& url, std::str
   const auto answer = client.value().call(method, target, body);
   if (!answer) return failed("anchord", answer.error().message);
   if (answer.value().status >= 400) return failed("anchord", api::problem_text(answer.value().body));
-  if (!answer.value().body.empty()) std::printf("%s\n", answer.value().body.c_str());
+  if (!answer.value().body.empty()) std::printf("%s\n", printable_json(answer.value().body).c_str());
   return 0;
 }
 
@@ -160,8 +161,8 @@ int list(const TokenOptions& options) {
       }
       if (token.requests_per_minute)
         sites += "  " + std::to_string(*token.requests_per_minute) + " requests a minute";
-      std::printf("%s  %-20s  %s  %s  %s\n", to_string(token.id).c_str(), token.name.c_str(), roles.c_str(),
-                  state.c_str(), sites.c_str());
+      std::printf("%s  %-20s  %s  %s  %s\n", to_string(token.id).c_str(), one_line(token.name).c_str(),
+                  roles.c_str(), state.c_str(), sites.c_str());
     }
     return 0;
   });

@@ -8,10 +8,12 @@
 
 #include "api/learning/labelled_dataset.hpp"
 #include "api/learning/model_artifact.hpp"
+#include "core/base/text.hpp"
 #include "core/base/whole_file.hpp"
 #include "server/cli/commands.hpp"
 #include "server/cli/failed.hpp"
 #include "server/cli/learning_data.hpp"
+#include "server/cli/terminal_text.hpp"
 #include "server/cli/words.hpp"
 
 namespace anchord::cli {
@@ -164,7 +166,7 @@ int train(const TrainArguments& a) {
     return failed("anchord train", written.error().message);
   const auto text = a.json ? api::train_json(learned.value(), report, a.out)
                            : api::train_text(learned.value(), report, a.out);
-  std::fputs(text.c_str(), stdout);
+  std::fputs((a.json ? printable_json(text) : printable(text)).c_str(), stdout);
   return 0;
 }
 

@@ -40,9 +40,9 @@ int verify(const std::string& pack, const std::string& key_file) {
     std::printf(
         "signed with the key in the pack, %s: to prove which server signed, give its key with --key (GET "
         "/api/v1/signing-key)\n",
-        v.key_id.c_str());
+        printable(v.key_id).c_str());
   else
-    std::printf("signed with the key given, %s\n", v.key_id.c_str());
+    std::printf("signed with the key given, %s\n", printable(v.key_id).c_str());
   return 0;
 }
 

@@ -283,6 +283,18 @@ TEST(TopScreen, BearsDocumentsThatAreNotWhatTheContractPromises) {
   }
 }
 
+TEST(TextTable, ShowsJsonThatMovesNoTerminalAndIsStillTheSameJson) {
+  const Json names = {
+      "a\xc2\x9b"
+      "31m",
+      "gnp\xe2\x80\xae.exe", "caf\xc3\xa9 \xf0\x9f\x9b\xb0\n", "a\"b\\c"};
+  const auto shown = cli::printable_json(names.dump(1));
+  EXPECT_EQ(Json::parse(shown), names);
+  EXPECT_EQ(shown.find("\xc2\x9b"), std::string::npos) << shown;
+  EXPECT_EQ(shown.find("\xe2\x80\xae"), std::string::npos) << shown;
+  EXPECT_NE(shown.find("caf\xc3\xa9 \xf0\x9f\x9b\xb0"), std::string::npos) << shown;
+}
+
 TEST(TextTable, CountsWideAndCombiningCharactersAsATerminalDoes) {
   // Unicode's EastAsianWidth.txt: hiragana and hangul are W, a combining acute takes no column.
   EXPECT_EQ(columns_of("abc"), 3u);
