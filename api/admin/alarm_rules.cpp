@@ -10,6 +10,8 @@ namespace {
 // dashboard.md section 6
 constexpr double k_lost_s = 2, k_float_s = 5, k_silent_ranges_s = 5, k_old_corrections_s = 10;
 constexpr double k_skew_s = 0.05;
+// A receiver may take so long to its first fix after it was switched on with the tag.
+constexpr double k_never_s = 20;
 // reliability.md section 2: warn at 2 GiB free, refuse new flights at 500 MiB
 constexpr std::uint64_t k_low_bytes = 2ULL << 30, k_refuse_bytes = 500ULL << 20;
 // Two seconds of the fastest ingest: what a writer that keeps up never lets wait.
@@ -30,7 +32,12 @@ void rtk(const FlightPulse& f, std::vector<AlarmCondition>& out) {
   const bool behind =
       !f.newest_fix || !f.newest_range || seconds_between(*f.newest_fix, *f.newest_range) > k_lost_s;
   const bool nothing = silence_s(f.range_arrival, f.now) > k_silent_ranges_s;
-  if (f.newest_fix && fixes_s > k_lost_s && (behind || nothing)) {
+  if (!f.newest_fix && holds_for(f.first_range, f.newest_range, k_never_s) && !nothing) {
+    out.push_back({"rtk.lost", AlarmPriority::critical,
+                   f.name + ": ranges, but not one position yet; no anchor can be located without: is the "
+                            "rover connected, and has it a fix?",
+                   f.mission});
+  } else if (f.newest_fix && fixes_s > k_lost_s && (behind || nothing)) {
     const bool perhaps_over = std::min(fixes_s, silence_s(f.range_arrival, f.now)) > k_perhaps_over_s;
     out.push_back(
         {"rtk.lost", AlarmPriority::critical,

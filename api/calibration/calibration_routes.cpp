@@ -188,6 +188,12 @@ PublishRequest read_publish(const nlohmann::json& body) {
 
 /// The calibration as it stands today: gate "moved" is asked against what is published now.
 void ask_whether_moved(CalibrationApi& s, Calibration& calibration) {
+  if (const auto datum = datum_gate(s, calibration)) {
+    for (auto& estimate : calibration.anchors) {
+      std::erase_if(estimate.gates, [](const Gate& g) { return g.name == "datum"; });
+      estimate.gates.push_back(*datum);
+    }
+  }
   const auto before = placed(value_or_problem(s.revisions.published(std::nullopt)));
   const auto now = placed(calibration);
   for (const auto& change : changes(now, before)) {

@@ -3,6 +3,7 @@
 #include <string>
 
 #include "api/anchors/anchor_goals.hpp"
+#include "api/calibration/datum_gate.hpp"
 #include "api/kit/audit.hpp"
 
 namespace anchord {
@@ -43,6 +44,7 @@ struct CalibrationApi {
   Audit audit;
   std::string program;  ///< "anchord 0.2.0", for reports
   AnchorGoals goals{};
+  DatumChanges datum_changes = std::make_shared<DatumChanges::element_type>();
 };
 
 void add_calibration_routes(Router& router, CalibrationApi& api);

@@ -106,6 +106,7 @@ constexpr std::array k_gate_words{
     GateWords{"halves", "The two halves of the flight agree", "χ²"},
     GateWords{"second_place", "Ranges that agree on another position", "%"},
     GateWords{"flights", "The flights agree", "χ²"},
+    GateWords{"datum", "Flights before the site's datum was changed", ""},
     GateWords{"moved", "Same position as before", "χ²"},
     GateWords{"bias", "Range bias of the kit, σ", "m"},
     GateWords{"lever_arm", "The lever arm fits the flight", "σ"},

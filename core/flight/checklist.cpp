@@ -54,7 +54,7 @@ std::vector<ChecklistItem> make_checklist(const ChecklistFacts& f) {
     out.push_back(item("drone", "The aircraft answers", d.connected && !d.failsafe && stale.empty() && alone,
                        false,
                        !alone           ? d.link_trouble
-                       : !d.connected   ? "no heartbeat"
+                       : !d.connected   ? "no heartbeat" + (d.link_fault.empty() ? "" : ": " + d.link_fault)
                        : !stale.empty() ? stale
                                         : d.autopilot + ", " + d.mode + (d.failsafe ? ", failsafe" : "")));
     auto arming =

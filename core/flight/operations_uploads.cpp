@@ -83,7 +83,7 @@ void Operations::give_fence(const Now& now) {
   }
   if (!preparing_ || drone_ == nullptr || flying()) return;
   const auto holder = lease_.holder(now);
-  if (holder && holder->mission != preparing_->first) return preparing_.reset();
+  if (holder && holder->mission != preparing_->first) return;  // until the other one has ended
   const Plan& plan = preparing_->second;
   if (!has_fence(plan)) return;
   if (const auto* up = uploaded(plan, "fence")) {

@@ -27,6 +27,7 @@ void FlightWatch::note(const Fix& fix) {
 }
 
 void FlightWatch::note_range(UtcTime measured) {
+  if (!pulse_.first_range) pulse_.first_range = measured;
   if (!pulse_.newest_range || *pulse_.newest_range < measured) pulse_.newest_range = measured;
 }
 

@@ -22,6 +22,7 @@ struct FlightPulse {
   std::string name;
   SteadyTime now{};
   std::optional<UtcTime> newest_fix{}, newest_range{};        ///< measured
+  std::optional<UtcTime> first_range{};                       ///< measured; of those since the start
   std::optional<SteadyTime> fix_arrival{}, range_arrival{};   ///< newest of each
   FixClass fix{FixClass::none};                               ///< of the newest
   std::optional<UtcTime> below_float_since{}, float_since{};  ///< measured; absent while it is better

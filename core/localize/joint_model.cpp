@@ -21,14 +21,13 @@ constexpr double k_hinge_m = 5.0;
 constexpr double k_least_slow_m = 0.05;   // no radio in the air was seen with less of it
 constexpr double k_believed_white = 0.9;  // the share is an estimate; too much of it claims too much
 
-/// Time the rows cover, pauses of more than 2 s left out.
+/// Time the rows cover; a pause counts for no more than 2 s. So rows that are all further apart are looks of
+/// their own, and errors that outlast a pause (real radios show them) are not taken for new ones.
 double duration_s(std::span<const double> stamps_s) {
+  constexpr double k_pause_s = 2.0;
   const double* const t_s = stamps_s.data();
   double sum_s = 0;
-  for (std::size_t i = 1; i < stamps_s.size(); ++i) {
-    const double step_s = t_s[i] - t_s[i - 1];
-    if (step_s <= 2.0) sum_s += step_s;
-  }
+  for (std::size_t i = 1; i < stamps_s.size(); ++i) sum_s += std::min(t_s[i] - t_s[i - 1], k_pause_s);
   return std::max(sum_s, 1.0);
 }
 

@@ -92,6 +92,7 @@ struct DroneStatus {
   std::vector<OtherOnLink> others;
   /// Why nobody is followed, or that two autopilots answer as one; empty: nothing is wrong with who is heard.
   std::string link_trouble;
+  std::string link_fault;  ///< why nobody can be heard, as far as the link itself shows; empty: it does not
 };
 
 /// A place of the route that the autopilot keeps beside its commands, for the pilot's own screen and for a

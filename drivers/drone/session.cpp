@@ -110,7 +110,7 @@ void Session::on_heartbeat(const mavlink::Received& in) {
   if (last_seen_s_ && now_s_ - *last_seen_s_ > k_vehicle_kept_s && !telemetry_.armed()) {
     // Long enough to switch another one on under the same id.
     telemetry_.restarted();
-    lists_lost("the aircraft was not heard for " + std::to_string(static_cast<int>(now_s_ - *last_seen_s_)) +
+    lists_lost("the aircraft was silent for " + std::to_string(static_cast<int>(now_s_ - *last_seen_s_)) +
                " s since, and may be another one");
   }
   vehicle_ = in.from;

@@ -67,6 +67,8 @@ void Telemetry::restarted() {
   status_.battery_v.reset();
   status_.ready_to_arm.reset();
   status_.not_ready.clear();
+  status_.text.clear();
+  warning_.clear();
   status_.battery_warning = 0;
   landed_ = 0;
   position_s_ = battery_s_ = warning_s_ = -1e9;

@@ -121,7 +121,9 @@ std::uint64_t Session::upload(ItemList list, std::vector<MissionItem> items) {
            transfer_ ? "another transfer is running" : "more than 1000 items");
     return number;
   }
-  kept_.erase(list);
+  if (const auto before = kept_.extract(list))
+    report(before.mapped(), "upload", CommandState::unconfirmed,
+           "followed by another upload of the " + list_word(list));
   report(number, "upload", CommandState::sent, list_word(list));
   transfer_ = Transfer{number, true, list, std::move(items), 0, 0, now_s_ - k_wait_s, 0, false, {}};
   transfer_->count = transfer_->items.size();

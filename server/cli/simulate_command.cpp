@@ -1,6 +1,8 @@
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <filesystem>
+#include <fstream>
+#include <iterator>
 #include <memory>
 
 #include "api/formats/flight_folder.hpp"
@@ -30,12 +32,31 @@ Result<void> write_truth(const sim::SimulatedFlight& flight, const std::filesyst
   return file.put_in_place();
 }
 
+/// Whether a flight is there that somebody flew: nothing brings it back once it is overwritten.
+bool holds_a_real_flight(const std::filesystem::path& folder) {
+  std::ifstream in(folder / "flight.json", std::ios::binary);
+  if (!in) return false;
+  const std::string text{std::istreambuf_iterator<char>(in), {}};
+  return text.find(R"("name": "simulated flight, seed )") == std::string::npos;
+}
+
 int simulate(const sim::SimulationOptions& options, const std::filesystem::path& folder) {
+  if (holds_a_real_flight(folder)) {
+    std::fprintf(
+        stderr,
+        "anchord simulate: %s has a flight that was not simulated, which would be overwritten: choose "
+        "another folder\n",
+        printable(folder.string()).c_str());
+    return 2;
+  }
   const auto flight = sim::simulate_flight(sim::demonstration_world(), options);
   if (!flight) {
     std::fprintf(stderr, "anchord simulate: %s\n", printable(flight.error().message).c_str());
     return 2;
   }
+  // Of the flight that was there: it would leave out rows of this one.
+  std::error_code none;
+  std::filesystem::remove(folder / "exclusions.json", none);
   if (const auto written = write_flight_folder(flight.value().data, folder); !written)
     return failed("anchord simulate", written.error().message);
   if (const auto written = write_truth(flight.value(), folder / "anchors_truth.csv"); !written)

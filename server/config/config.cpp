@@ -81,7 +81,8 @@ constexpr std::array k_options = {
            "stay",
            days},
     Option{"drone.address", "",
-           "address of the MAVLink connection to the autopilot, like udp://:14550, tcp://127.0.0.1:5760 or "
+           "address of the MAVLink connection to the autopilot, like udp://:14550 (from this machine), "
+           "udp://0.0.0.0:14550 (from the network, with a key), tcp://127.0.0.1:5760 or "
            "serial:/dev/ttyACM0; empty: flown by hand"},
     Option{"drone.signing_key_file", "",
            "file (mode 0600) with the key of MAVLink 2 signing; frames without its signature are rejected"},

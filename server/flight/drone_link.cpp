@@ -32,6 +32,7 @@ struct Dialogue {
 
   drone::PeerGate gate;
   drone::Session session;
+  std::string link_fault;  ///< why the link is closed; empty: it is open
 };
 
 }  // namespace
@@ -53,6 +54,14 @@ struct DroneLink::Impl {
 
   static std::span<const std::uint8_t> bytes_of(std::string_view in) {
     return {reinterpret_cast<const std::uint8_t*>(in.data()), in.size()};
+  }
+
+  /// Where it listens, where an aircraft on the network could not be received.
+  std::string reach() const {
+    const bool here = address.kind == link::Kind::udp && address.host.empty();
+    if (!here) return {};
+    return "the link is open to this machine alone (" + link::to_string(address) +
+           "); for an aircraft on the network: udp://0.0.0.0:PORT with a signing key";
   }
 
   /// Told once, who it is and who it is no longer.
@@ -87,6 +96,7 @@ struct DroneLink::Impl {
         const bool judged = address.kind == link::Kind::udp || address.kind == link::Kind::tcp_listen;
         if (!judged && !admits(in, "", at)) return;
         auto now = dialogue.lock();
+        now->link_fault.clear();
         now->session.feed(seconds(at), at.utc.us(), bytes_of(in));
       });
     };
@@ -94,6 +104,8 @@ struct DroneLink::Impl {
       if (log && why.message != last_trouble) log("aircraft: " + why.message);
       last_trouble = why.message;
       closed_for = 1;
+      auto now = dialogue.lock();
+      now->link_fault = why.message;
     };
     closed_for = 0;
     bytes->open(std::move(handlers));
@@ -244,6 +256,7 @@ DroneStatus DroneLink::status() const {
   const double now_s = seconds(link::arrival_now());
   out.others = now->gate.others(now_s);
   if (out.link_trouble.empty()) out.link_trouble = now->gate.trouble(now_s, out.connected);
+  if (!out.connected) out.link_fault = now->link_fault.empty() ? impl_->reach() : now->link_fault;
   return out;
 }
 std::vector<CommandReport> DroneLink::take_reports() {

@@ -60,6 +60,16 @@ TEST(AlarmRules, CallRtkLostWhenTheRoverFallsSilentWhileRangesCome) {
   EXPECT_EQ(raised(f), "");
 }
 
+TEST(AlarmRules, CallRtkLostWhenRangesComeAndNeverAPosition) {
+  auto f = well();
+  f.newest_fix.reset();
+  f.fix_arrival.reset();
+  f.first_range = f.newest_range;
+  EXPECT_EQ(raised(f), "") << "the rover may come yet";
+  f.first_range->ns -= 25'000'000'000;
+  EXPECT_EQ(raised(f), "rtk.lost");
+}
+
 TEST(AlarmRules, CallRtkLostWhenCorrectionsAreOld) {
   auto f = well();
   f.correction_age_s = 10.5;

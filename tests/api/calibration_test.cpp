@@ -593,6 +593,33 @@ TEST_F(DatumChanges, MoveWhatIsPublishedAndKeepWhatWas) {
   EXPECT_EQ(calibration["settings"]["datum_change"]["note"], "base surveyed again");
 }
 
+TEST_F(DatumChanges, HoldBackWhatIsMadeOfFlightsBeforeThem) {
+  const auto site_id = published_site();
+  const auto calibration = json(get("/api/v1/calibrations"))["items"][0]["id"].get<std::string>();
+  const auto publish = [&](const std::string& id) {
+    return post("/api/v1/calibrations/" + id + "/publish", "{}");
+  };
+  EXPECT_EQ(publish(calibration).status, 201) << "the datum was never changed";
+  clock_.ahead_s = clock_.ahead_s + 60;
+  // So little that no test of two positions sees it.
+  const auto done = post("/api/v1/sites/" + site_id + "/datum",
+                         R"({"shift":{"east_m":0.1,"north_m":0,"up_m":0},"note":"base surveyed again"})");
+  ASSERT_EQ(done.status, 201) << done.body;
+  const auto after = features();
+  const auto refused = publish(calibration);
+  EXPECT_EQ(refused.status, 409) << refused.body;
+  EXPECT_NE(refused.body.find("which changed the datum of the site"), std::string::npos) << refused.body;
+  EXPECT_EQ(features(), after);
+  clock_.ahead_s = clock_.ahead_s + 60;
+  const auto later = solved(flown(made(22), 0, site_id));
+  const auto gates =
+      json(get("/api/v1/calibrations/" + later["id"].get<std::string>()))["anchors"][0]["quality"]["gates"];
+  for (const auto& gate : gates)
+    if (gate["name"] == "datum") {
+      EXPECT_TRUE(gate["passed"]) << gate;
+    }
+}
+
 TEST_F(DatumChanges, PutAMarkWhereItIs) {
   const auto path = "/api/v1/sites/" + published_site() + "/datum";
   const Wgs84 at = place(features()[0]);

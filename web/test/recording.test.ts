@@ -2,6 +2,7 @@ import { describe, expect, it } from 'vitest';
 import { estimate, type MissionMsg, type RangeMsg } from '../src/live/messages';
 import {
   after,
+  arrivals_of,
   marks_of,
   neighbour,
   Player,
@@ -160,6 +161,27 @@ describe('events of a recording', () => {
     expect(way(0, 1)).toEqual([100, 200, 300]);
     expect(way(599, -1)).toEqual([300, 200, 100]);
     expect(way(250, -1)).toEqual([200, 100]);
+  });
+});
+
+describe('events of a flight that was played again', () => {
+  // 600 s, played four times as fast an hour later.
+  const rows = seconds.map((t) => ({ t_us: t * 1e6, received_us: 3600e6 + (t / 4) * 1e6 })),
+    event = (wall_s: number) => ({
+      t_us: wall_s * 1e6,
+      level: 'info' as const,
+      code: 'anchor.found',
+      text: '',
+      id: 'e',
+    });
+  it('stand where the rows of that moment are', () => {
+    const marks = marks_of([event(3600), event(3650), event(3749)], 0, 599e6, arrivals_of(rows));
+    expect(marks.map((m) => Math.round(m.t_us / 1e6))).toEqual([0, 200, 596]);
+  });
+  it('stay where they are in a flight that was followed as it was flown', () => {
+    const live = arrivals_of(seconds.map((t) => ({ t_us: t * 1e6, received_us: t * 1e6 + 80_000 })));
+    expect(marks_of([event(300.5)], 0, 599e6, live).map((m) => m.t_us)).toEqual([300.5e6]);
+    expect(marks_of([event(300.5)], 0, 599e6, []).map((m) => m.t_us)).toEqual([300.5e6]);
   });
 });
 

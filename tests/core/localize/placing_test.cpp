@@ -254,7 +254,7 @@ TEST(FlightCopies, AreFlightsWithMostOfTheSameRangesWhateverTheirTrackAndTheLarg
     for (int i = 0; i < 3000; ++i) {
       Range range;
       range.anchor = NetworkId{0x6a30};
-      range.time.ns = i * 100'000'000;
+      range.time.ns = std::int64_t{i} * 100'000'000;
       range.distance_m = std::round(noise(random) * 100) / 100;
       flight.ranges.push_back(range);
     }

@@ -6,7 +6,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <numbers>
+#include <random>
 
 #include "core/localize/flight_solver.hpp"
 #include "tests/core/localize/flight_support.hpp"
@@ -161,6 +163,68 @@ TEST(SystematicErrors, WithholdEveryAnchorWhereRangesMeasuredHighAreLate) {
       EXPECT_FALSE(anchor.estimate.acceptable());
     }
   }
+}
+
+/// Two rings round the building, at 3 and 9 m.
+FlightData two_rings(std::uint64_t seed) {
+  MadeFlight made = turning(seed);
+  made.duration_s = 240;
+  FlightData flight = make_flight(made);
+  std::mt19937_64 random(seed);
+  std::normal_distribution<double> noise(0, 1);
+  const auto place = [](double t_s) {
+    return Eigen::Vector3d(19 * std::sin(t_s / 120 * 2 * std::numbers::pi),
+                           14 * std::cos(t_s / 120 * 2 * std::numbers::pi), t_s < 120 ? 3 : 9);
+  };
+  for (Fix& fix : flight.fixes)
+    fix.local_m =
+        place(fix.time.seconds()) + 0.005 * Eigen::Vector3d(noise(random), noise(random), noise(random));
+  for (Range& range : flight.ranges)
+    range.distance_m = (place(range.time.seconds()) - made.anchors[range.anchor.value - 0x6000]).norm() +
+                       0.06 * noise(random);
+  return flight;
+}
+
+TEST(SectorDoubt, HoldsWhereAnAnchorWouldBeWithoutADelayOfItsUpperRingAlone) {
+  const Eigen::Vector3d truth_m = MadeFlight{}.anchors[1];
+  int n_accepted_beyond = 0;
+  for (std::uint64_t seed = 1; seed <= 12; ++seed) {
+    FlightData flight = two_rings(seed);
+    for (Range& range : flight.ranges)
+      if (range.anchor == NetworkId{0x6001} && range.time.seconds() >= 120) range.distance_m += 0.2;
+    const FlightSolution solution = solve_flight(flight).value();
+    const Estimate& late = solution.anchors[1].estimate;
+    ASSERT_TRUE(late.best);
+    const double up_m = std::abs(late.best->position.m.z() - truth_m.z());
+    n_accepted_beyond += late.acceptable() && up_m > 1.5 * late.v95_m ? 1 : 0;
+    for (const AnchorSolution& other : solution.anchors)
+      if (other.estimate.anchor != NetworkId{0x6001}) {
+        EXPECT_LT(other.estimate.v95_m, 0.6) << "honest ones pay nothing";
+      }
+  }
+  EXPECT_LE(n_accepted_beyond, 2) << "of twelve";
+}
+
+TEST(JointModel, RangesThatAreAllFurtherApartThanTwoSecondsAreLooksOfTheirOwn) {
+  const auto thinned_h95_m = [](double period_s) {
+    FlightData flight = two_rings(3);
+    std::map<NetworkId, double> last_s;
+    std::erase_if(flight.ranges, [&](const Range& range) {
+      auto [at, fresh] = last_s.try_emplace(range.anchor, -1e9);
+      if (range.time.seconds() - at->second < period_s) return true;
+      at->second = range.time.seconds();
+      return false;
+    });
+    std::vector<double> h95_m;
+    for (const AnchorSolution& anchor : solve_flight(flight).value().anchors) {
+      EXPECT_TRUE(anchor.estimate.acceptable()) << period_s << " s: " << anchor.estimate.reason;
+      h95_m.push_back(anchor.estimate.h95_m);
+    }
+    return *std::ranges::max_element(h95_m);
+  };
+  const double dense_m = thinned_h95_m(1.9), sparse_m = thinned_h95_m(2.1);
+  EXPECT_LT(sparse_m, 1.3 * dense_m);
+  EXPECT_LT(thinned_h95_m(4.2), 2 * dense_m) << "half as many";
 }
 
 TEST(SystematicErrors, WithholdEveryAnchorWhereRangesDrift) {

@@ -144,15 +144,46 @@ const place_of = (place: unknown): Lonlat | null => {
   return lon === null || lat === null ? null : { lon, lat };
 };
 
+/// A row, and when the server received it.
+export interface Arrival extends Timed {
+  readonly received_us: number;
+}
+const PLAYED_AGAIN_US = 5e6;
+
+/// In the order in which they were received.
+export const arrivals_of = (rows: readonly Unchecked<Wire<'Fix'>>[]): Arrival[] =>
+  objects(rows)
+    .flatMap((row) => {
+      const t_us = num(row.t_us),
+        received_us = num(row.received_us);
+      return t_us === null || received_us === null ? [] : [{ t_us, received_us }];
+    })
+    .sort((a, b) => a.received_us - b.received_us);
+
+/// When in the flight that was which the server saw at this moment: a flight that is played again, or faster than it was flown, has rows of other times.
+export function flight_time(arrivals: readonly Arrival[], at_us: number): number {
+  let lo = 0,
+    hi = arrivals.length;
+  while (lo < hi) {
+    const mid = (lo + hi) >> 1;
+    if (arrivals[mid]!.received_us <= at_us) lo = mid + 1;
+    else hi = mid;
+  }
+  const row = arrivals[Math.max(0, lo - 1)],
+    shift_us = row ? row.t_us - row.received_us : 0;
+  return Math.abs(shift_us) < PLAYED_AGAIN_US ? at_us : at_us + shift_us;
+}
+
 /// Events within the recording, in the order of the flight: the server gives the newest first.
 export const marks_of = (
   events: readonly Unchecked<Wire<'Event'>>[],
   from_us: number,
   to_us: number,
+  arrivals: readonly Arrival[] = [],
 ): Recording['marks'] =>
   objects(events)
     .map((e) => ({
-      t_us: count(e.t_us),
+      t_us: flight_time(arrivals, count(e.t_us)),
       level: str(e.level),
       code: str(e.code),
       text: str(e.text),
@@ -201,7 +232,14 @@ export async function load_recording(mission: MissionMsg, read: (n_rows: number)
     poses = poses_of(fixes.rows, mission.mission, mission.origin).sort(by_time),
     cut = fixes.cut || ranges.cut,
     span = span_of(poses, ranges.rows.sort(by_time), cut);
-  return { mission, ...span, poses, ranges: ranges.rows, cut, marks: marks_of(events.rows, span.from_us, span.to_us) };
+  return {
+    mission,
+    ...span,
+    poses,
+    ranges: ranges.rows,
+    cut,
+    marks: marks_of(events.rows, span.from_us, span.to_us, arrivals_of(fixes.rows)),
+  };
 }
 
 /// What was estimated when, in the order of time: the server computes it from the stored rows, which takes seconds for a long flight.

@@ -58,6 +58,11 @@ const WORDS: Record<string, Words> = {
     unit: '%',
   },
   flights: { passes: 'The flights agree', fails: 'The flights disagree', unit: 'χ²' },
+  datum: {
+    passes: 'Flights before the site’s datum was changed',
+    fails: 'Flown before the site’s datum was changed: former coordinates',
+    unit: '',
+  },
   moved: { passes: 'Same position as before', fails: 'It has moved, or one of the positions is wrong', unit: 'χ²' },
   bias: { passes: 'Range bias of the kit is known, σ', fails: 'Range bias of the kit is not known, σ', unit: 'm' },
   lever_arm: { passes: 'The lever arm fits the flight', fails: 'The lever arm does not fit the flight', unit: 'σ' },
