@@ -53,12 +53,10 @@ std::vector<std::uint64_t> keys_of(const FlightData& flight) {
 std::size_t in_common(const std::vector<std::uint64_t>& a, const std::vector<std::uint64_t>& b) {
   std::size_t n = 0;
   for (auto i = a.begin(), k = b.begin(); i != a.end() && k != b.end();) {
-    if (*i == *k)
-      ++n, ++i, ++k;
-    else if (*i < *k)
-      ++i;
-    else
-      ++k;
+    const auto way = *i <=> *k;
+    n += way == 0 ? 1 : 0;
+    if (way <= 0) ++i;
+    if (way >= 0) ++k;
   }
   return n;
 }

@@ -1,7 +1,6 @@
 #include "server/app/startup.hpp"
 
 #include "api/mqtt/topic_name.hpp"
-#include "drivers/drone/signing_key.hpp"
 #include "drivers/link/address.hpp"
 #include "server/app/proxies.hpp"
 #include "server/config/listeners.hpp"

@@ -4,7 +4,7 @@
 #include <string>
 
 #include "core/base/result.hpp"
-#include "drivers/mavlink/frame.hpp"
+#include "drivers/drone/signing_key.hpp"
 #include "server/config/config.hpp"
 #include "server/mqtt/mqtt_broker.hpp"
 

@@ -397,7 +397,10 @@ export function standing(d: Device, recent: Lately, same_id_speaks = true): Stan
     return stand('found', 'info', 'OPENING', 'Its link is being opened.');
   if (!linked) return not_linked(d);
   if (d.state === 'silent')
-    return silent(d, total(recent.dropped) > (recent.dropped.no_reply ?? 0) || /make no frame|none of them can be used/.test(d.reason));
+    return silent(
+      d,
+      total(recent.dropped) > (recent.dropped.no_reply ?? 0) || /make no frame|none of them can be used/.test(d.reason),
+    );
   if (d.state === 'open' && noise_bytes(recent.dropped) > 0) return silent(d, true);
   if (d.state === 'open' && (d.counters.opened ?? 0) > 1)
     return caution(
