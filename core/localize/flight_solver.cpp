@@ -319,13 +319,15 @@ FlightSolution describe(Work& work, const FlightData& flight) {
   return solution;
 }
 
+void note_wider(Work& work, std::size_t n_wider, const char* why) {
+  if (n_wider == 0) return;
+  work.rows.notes.push_back(std::to_string(n_wider) + " of " + std::to_string(work.rows.anchors.size()) +
+                            " anchors are less certain because " + why);
+}
+
 /// Delays that the ranges may hide: the regions hold them.
 void add_delay_doubts(Work& work) {
-  const auto note = [&](std::size_t n_wider, const char* why) {
-    if (n_wider == 0) return;
-    work.rows.notes.push_back(std::to_string(n_wider) + " of " + std::to_string(work.rows.anchors.size()) +
-                              " anchors are less certain because " + why);
-  };
+  const auto note = [&](std::size_t n_wider, const char* why) { note_wider(work, n_wider, why); };
   note(
       add_scatter_doubt(work.rows, work.prior, work.options, work.fit),
       "their ranges scatter more from some directions than from others: an obstacle there may lengthen them");
@@ -356,6 +358,9 @@ Result<void> check_flight(const FlightData& flight, std::vector<Work>& all, std:
   BOOST_OUTCOME_TRY(ask_errors(work));
   BOOST_OUTCOME_TRYV(go_on(options));
   ask_shift(flight, work);
+  note_wider(work, add_level_doubt(work.rows, work.options, work.fit),
+             "their ranges fit better if those from above or below some height are too long: a roof, beam or "
+             "slab may lengthen them");
   if (work.rows.step_share > 0) work.checks.push_back(check_steps(work.rows.step_share, options));
   const auto others = others_of(all, i, options);
   if (!others.empty() && !options.fixed_bias_m)

@@ -2,7 +2,6 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <numbers>
 #include <span>
@@ -48,14 +47,49 @@ struct BinSums {
     return *this;
   }
 };
-/// The ranges of an anchor by where the tag was: round it, and from the lowest up.
-struct Places {
-  std::array<BinSums, k_bins> bearing{};
-  std::vector<BinSums> level{};  ///< empty: too little of a climb to tell any from the others
-};
+/// The ranges of an anchor, each in the bin that `bin_of` names for the line to its antenna.
+template <class BinOf>
+std::vector<BinSums> binned(const JointLines& lines, const FlightOptions& options, double scale_m,
+                            std::size_t n_bins, const BinOf& bin_of) {
+  const double wide_m = k_wide_scales * scale_m;
+  std::vector<BinSums> bins(n_bins);
+  for (std::size_t i = 0; i < lines.size(); ++i) {
+    if (lines.rows()[i]->error_model) continue;
+    const JointLine at = lines.line(i);
+    const double size_m = std::abs(at.residual_m);
+    const double weight = size_m <= wide_m ? 1.0 : wide_m * wide_m / (size_m * size_m);
+    BinSums& bin = bins[bin_of(at)];
+    Vector5 by;
+    by << at.by_anchor, 1.0;
+    bin.normal.noalias() += weight * by * by.transpose();
+    bin.pull += weight * at.residual_m * by;
+    bin.square_m2 += weight * at.residual_m * at.residual_m;
+    bin.kept += robust_weight(at.residual_m / scale_m, options);
+    ++bin.n;
+  }
+  return bins;
+}
 
-/// Upper ends of the levels, of as many ranges each.
-std::vector<double> ends_of_levels(const JointLines& lines) {
+JointLines lines_of(const FlightRows& flight, const JointFit& fit, std::size_t index) {
+  return {flight.track, flight.anchors[index].rows, fit.state.shared, fit.state.anchors[index]};
+}
+
+std::vector<BinSums> by_bearing(const FlightRows& flight, const FlightOptions& options, const JointFit& fit,
+                                std::size_t index) {
+  const Eigen::Vector3d& anchor_m = fit.state.anchors[index].position_m;
+  return binned(lines_of(flight, fit, index), options, fit.normal.anchors[index].scale_m, k_bins,
+                [&](const JointLine& at) {
+                  const Eigen::Vector3d ray = at.antenna_m - anchor_m;
+                  const double turns = std::atan2(ray.y(), ray.x()) / (2 * std::numbers::pi) + 0.5;
+                  return std::min(static_cast<std::size_t>(turns * k_bins), k_bins - 1);
+                });
+}
+
+/// By the height of the tag, in steps of as many ranges each; empty: too little of a climb to tell any from
+/// the others.
+std::vector<BinSums> by_level(const FlightRows& flight, const FlightOptions& options, const JointFit& fit,
+                              std::size_t index) {
+  const JointLines lines = lines_of(flight, fit, index);
   std::vector<double> heights_m;
   for (std::size_t i = 0; i < lines.size(); ++i)
     if (!lines.rows()[i]->error_model) heights_m.push_back(lines.line(i).antenna_m.z());
@@ -63,35 +97,9 @@ std::vector<double> ends_of_levels(const JointLines& lines) {
   if (heights_m.empty() || heights_m.back() - heights_m.front() < k_least_climb_m) return {};
   std::vector<double> ends_m;
   for (std::size_t k = 1; k < k_levels; ++k) ends_m.push_back(heights_m[k * heights_m.size() / k_levels]);
-  return ends_m;
-}
-
-Places by_place(const FlightRows& flight, const FlightOptions& options, const JointFit& fit,
-                std::size_t index) {
-  const JointState::Anchor& anchor = fit.state.anchors[index];
-  const double wide_m = k_wide_scales * fit.normal.anchors[index].scale_m;
-  Places out;
-  const JointLines lines(flight.track, flight.anchors[index].rows, fit.state.shared, anchor);
-  const auto ends_m = ends_of_levels(lines);
-  if (!ends_m.empty()) out.level.resize(k_levels);
-  for (std::size_t i = 0; i < lines.size(); ++i) {
-    if (lines.rows()[i]->error_model) continue;
-    const JointLine at = lines.line(i);
-    const double size_m = std::abs(at.residual_m);
-    const double weight = size_m <= wide_m ? 1.0 : wide_m * wide_m / (size_m * size_m);
-    const Eigen::Vector3d ray = at.antenna_m - anchor.position_m;
-    const double turns = std::atan2(ray.y(), ray.x()) / (2 * std::numbers::pi) + 0.5;
-    Vector5 by;
-    by << at.by_anchor, 1.0;
-    const double kept = robust_weight(at.residual_m / fit.normal.anchors[index].scale_m, options);
-    const BinSums row{weight * by * by.transpose(), weight * at.residual_m * by,
-                      weight * at.residual_m * at.residual_m, kept, 1};
-    out.bearing[std::min(static_cast<std::size_t>(turns * k_bins), k_bins - 1)] += row;
-    if (!out.level.empty())
-      out.level[static_cast<std::size_t>(std::ranges::upper_bound(ends_m, at.antenna_m.z()) -
-                                         ends_m.begin())] += row;
-  }
-  return out;
+  return binned(lines, options, fit.normal.anchors[index].scale_m, k_levels, [&](const JointLine& at) {
+    return static_cast<std::size_t>(std::ranges::upper_bound(ends_m, at.antenna_m.z()) - ends_m.begin());
+  });
 }
 
 /// The part of the ranges that is most likely late.
@@ -188,21 +196,30 @@ std::size_t add_sector_doubt(const FlightRows& flight, const FlightOptions& opti
   std::size_t n_wider = 0;
   for (std::size_t i = 0; i < flight.anchors.size(); ++i) {
     if (!fit.state.anchors[i].active) continue;
-    const Places places = by_place(flight, options, fit, i);
-    const LateSide side = late_sector(places.bearing, fit.normal.anchors[i]),
-                   level = late_level(places.level, fit.normal.anchors[i]);
-    const double by_side = share_of(side, k_doubted_gain, k_believed_gain),
-                 by_level = share_of(level, k_doubted_level_gain, k_believed_level_gain);
-    if (!(by_side > 0) && !(by_level > 0)) continue;
+    const LateSide side = late_sector(by_bearing(flight, options, fit, i), fit.normal.anchors[i]);
+    const double share = share_of(side, k_doubted_gain, k_believed_gain);
+    if (!(share > 0)) continue;
     Eigen::Matrix4d& covariance_m2 = fit.anchor_covariance[i];
     const Eigen::Matrix4d before_m2 = covariance_m2;
-    if (by_side > 0) {
-      reach(by_side * side.moved, options.dims, covariance_m2);
-      widen_in_plane(
-          by_side * std::max(side.moved.head<2>().norm(), 2 / std::numbers::pi * side.kept * side.delay_m),
-          covariance_m2);
-    }
-    if (by_level > 0) reach({0, 0, by_level * level.moved[2], 0}, options.dims, covariance_m2);
+    reach(share * side.moved, options.dims, covariance_m2);
+    widen_in_plane(
+        share * std::max(side.moved.head<2>().norm(), 2 / std::numbers::pi * side.kept * side.delay_m),
+        covariance_m2);
+    n_wider += much_wider(covariance_m2, before_m2, options.dims) ? 1 : 0;
+  }
+  return n_wider;
+}
+
+std::size_t add_level_doubt(const FlightRows& flight, const FlightOptions& options, JointFit& fit) {
+  std::size_t n_wider = 0;
+  for (std::size_t i = 0; i < flight.anchors.size(); ++i) {
+    if (!fit.state.anchors[i].active) continue;
+    const LateSide level = late_level(by_level(flight, options, fit, i), fit.normal.anchors[i]);
+    const double share = share_of(level, k_doubted_level_gain, k_believed_level_gain);
+    if (!(share > 0)) continue;
+    Eigen::Matrix4d& covariance_m2 = fit.anchor_covariance[i];
+    const Eigen::Matrix4d before_m2 = covariance_m2;
+    reach({0, 0, share * level.moved[2], 0}, options.dims, covariance_m2);
     n_wider += much_wider(covariance_m2, before_m2, options.dims) ? 1 : 0;
   }
   return n_wider;

@@ -29,7 +29,7 @@ TEST(Startup, SettingsWithWhichNoServerStartsAreNamedBeforeItIsTried) {
   const std::vector<std::pair<Settings, std::string>> cases{
       {{{"listen", "0.0.0.0:8420"}}, "0.0.0.0:8420"},
       {{{"tls.certificate", "/nowhere/cert.pem"}, {"tls.key", "/nowhere/key.pem"}}, "/nowhere/"},
-      {{{"standby", "on"}}, "standby: a folder has one server"},
+      {{{"standby", "true"}}, "standby: a folder has one server"},
       {{{"trusted_proxies", "300.1.1.1"}}, "300.1.1.1"},
       {{{"devices", "gnss"}}, "is not kind=address"},
       {{{"devices", "gnss=foo"}}, "devices: "},
