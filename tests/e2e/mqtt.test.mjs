@@ -77,7 +77,7 @@ test('a subscriber that comes later reads anchors, estimates, mission, alarms an
     );
   });
   for (const { properties, geometry } of anchors) {
-    const one = JSON.parse(topics.get(`anchord/_none/anchors/${properties.network_id}`));
+    const one = JSON.parse(topics.get(`anchord/Hall %231/anchors/${properties.network_id}`));
     assert.deepEqual(one.geometry, geometry);
   }
   assert.equal(JSON.parse(topics.get('anchord/_server/status')).state, 'online');
