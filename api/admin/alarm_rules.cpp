@@ -34,8 +34,8 @@ void rtk(const FlightPulse& f, std::vector<AlarmCondition>& out) {
   const bool nothing = silence_s(f.range_arrival, f.now) > k_silent_ranges_s;
   if (!f.newest_fix && holds_for(f.first_range, f.newest_range, k_never_s) && !nothing) {
     out.push_back({"rtk.lost", AlarmPriority::critical,
-                   f.name + ": ranges, but not one position yet; no anchor can be located without: is the "
-                            "rover connected, and has it a fix?",
+                   f.name + ": ranges are received, but no position yet, and without positions no anchor "
+                            "can be located: is the rover connected, and does it have a fix?",
                    f.mission});
   } else if (f.newest_fix && fixes_s > k_lost_s && (behind || nothing)) {
     const bool perhaps_over = std::min(fixes_s, silence_s(f.range_arrival, f.now)) > k_perhaps_over_s;

@@ -24,11 +24,6 @@ namespace anchord::api {
 namespace {
 
 using Json = nlohmann::json;
-using Bounds = record_limits::Bounds;
-using WholeBounds = record_limits::WholeBounds;
-
-constexpr Bounds bounds(const row_limits::Bounds& b) { return {b.min, b.max}; }
-constexpr WholeBounds bounds(const row_limits::WholeBounds& b) { return {b.min, b.max}; }
 
 constexpr std::size_t k_cir_cells = 4;
 /// Of rows that a device of the server sent, which passed its driver: a Pozyx radio tells up to a kilometre,
@@ -81,9 +76,9 @@ constexpr std::array k_texts{
     TextRule{{"", "*"}, record_limits::k_words, false}};
 
 constexpr std::array k_reals{
-    RealRule{{"", "*lat_deg"}, bounds(row_limits::k_lat_deg)},
-    RealRule{{"", "*lon_deg"}, bounds(row_limits::k_lon_deg)},
-    RealRule{{"", "*origin_height_m"}, bounds(row_limits::k_height_m)},
+    RealRule{{"", "*lat_deg"}, row_limits::k_lat_deg},
+    RealRule{{"", "*lon_deg"}, row_limits::k_lon_deg},
+    RealRule{{"", "*origin_height_m"}, row_limits::k_height_m},
     RealRule{{"site", "crs_epoch_year"}, record_limits::k_crs_epoch_year},
     RealRule{{"site", "base_sigma_m"}, record_limits::k_base_sigma_m},
     RealRule{{"mission_tag", "*"}, record_limits::k_lever_arm_m},
@@ -93,15 +88,15 @@ constexpr std::array k_reals{
     RealRule{{"plan_tiles", "m_per_px"}, {0, k_any_m}},
     RealRule{{"uwb_range", "distance_m"}, k_stored_distance_m},
     RealRule{{"uwb_range", "*_dbm"}, k_stored_dbm},
-    RealRule{{"uwb_range", "std_noise"}, bounds(row_limits::k_std_noise)},
-    RealRule{{"uwb_range", "heading_deg"}, bounds(row_limits::k_heading_deg)},
-    RealRule{{"uwb_range", "truth_distance_m"}, bounds(row_limits::k_truth_distance_m)},
-    RealRule{{"uwb_range", "first_path_idx"}, bounds(row_limits::k_cir_first_path)},
-    RealRule{{"uwb_range", "preamble_count"}, bounds(row_limits::k_cir_preamble)},
-    RealRule{{"fix", "height_m"}, bounds(row_limits::k_height_m)},
-    RealRule{{"fix", "*_m"}, bounds(row_limits::k_local_m)},
+    RealRule{{"uwb_range", "std_noise"}, row_limits::k_std_noise},
+    RealRule{{"uwb_range", "heading_deg"}, row_limits::k_heading_deg},
+    RealRule{{"uwb_range", "truth_distance_m"}, row_limits::k_truth_distance_m},
+    RealRule{{"uwb_range", "first_path_idx"}, row_limits::k_cir_first_path},
+    RealRule{{"uwb_range", "preamble_count"}, row_limits::k_cir_preamble},
+    RealRule{{"fix", "height_m"}, row_limits::k_height_m},
+    RealRule{{"fix", "*_m"}, row_limits::k_local_m},
     RealRule{{"fix", "*_m2"}, k_stored_covariance_m2},
-    RealRule{{"fix", "correction_age_s"}, bounds(row_limits::k_correction_age_s)},
+    RealRule{{"fix", "correction_age_s"}, row_limits::k_correction_age_s},
     RealRule{{"estimate", "h95_m"}, {0, k_any_m}},
     RealRule{{"estimate", "v95_m"}, {0, k_any_m}},
     RealRule{{"estimate", "gdop"}, {0, k_any_m}},
@@ -124,11 +119,11 @@ constexpr std::array k_wholes{
     WholeRule{{"", "network_id"}, k_network_id},
     WholeRule{{"", "tag"}, k_network_id},
     WholeRule{{"", "anchor"}, k_network_id},
-    WholeRule{{"", "antenna"}, bounds(row_limits::k_antenna)},
+    WholeRule{{"", "antenna"}, row_limits::k_antenna},
     WholeRule{{"uwb_range", "*t_ns"}, k_measured_t_ns},
     WholeRule{{"fix", "*t_ns"}, k_measured_t_ns},
     WholeRule{{"", "*t_ns"}, {0, record_limits::k_latest_us * 1000}},
-    WholeRule{{"", "seq"}, bounds(row_limits::k_seq)},
+    WholeRule{{"", "seq"}, row_limits::k_seq},
     WholeRule{{"", "version"}, k_from_1},
     WholeRule{{"", "frame"}, of(k_frame_words)},
     WholeRule{{"mission", "track_point"}, of(k_point_words)},
@@ -138,7 +133,7 @@ constexpr std::array k_wholes{
     WholeRule{{"plan_image", "kind"}, of(k_image_kind_words)},
     WholeRule{{"device_seen", "kind"}, k_yes_or_no},
     WholeRule{{"fix", "fix_class"}, of(k_fix_words)},
-    WholeRule{{"fix", "satellites"}, bounds(row_limits::k_satellites)},
+    WholeRule{{"fix", "satellites"}, row_limits::k_satellites},
     WholeRule{{"estimate", "verdict"}, of(k_verdict_words)},
     WholeRule{{"site", "projected_epsg"}, record_limits::k_epsg},
     WholeRule{{"anchor", "retired"}, k_yes_or_no},
@@ -296,7 +291,7 @@ std::string RowCheck::range_fault(const BundleRow& row) const {
   if (samples == nullptr || !given(row[cir])) return "dt_ps and re_im are not both there";
   const double dt_ps = real_of(row[cir]);  // 0: the usual one
   if (dt_ps != 0 && !row_limits::k_cir_dt_ps.hold(dt_ps))
-    return "dt_ps " + number_fault(bounds(row_limits::k_cir_dt_ps), dt_ps);
+    return "dt_ps " + number_fault(row_limits::k_cir_dt_ps, dt_ps);
   if (samples->size() % 4 != 0 ||
       !row_limits::k_cir_taps.hold(static_cast<std::int64_t>(samples->size() / 4)))
     return "re_im are not 1 to " + std::to_string(row_limits::k_cir_taps.max) + " samples of 4 bytes";

@@ -25,8 +25,8 @@ class RowCheck {
     Document document{Document::none};
     std::size_t most_characters{};
     bool required{};  ///< text that is not blank
-    std::optional<record_limits::Bounds> real{};
-    std::optional<record_limits::WholeBounds> whole{};
+    std::optional<Bounds> real{};
+    std::optional<WholeBounds> whole{};
   };
   std::string text_fault(const Column& column, const std::string& text) const;
   std::string cell_fault(const Column& column, const BundleCell& cell) const;

@@ -91,7 +91,7 @@ std::string bytes_of(ExchangeApi& s, std::string_view format, const Anchors& anc
 
 /// A drawing does not show what is missing. Of a site none of whose anchors is known to be there, nothing is
 /// drawn: where others are published that are in no site, they are most likely those.
-void refuse_if_homeless(ExchangeApi& s, const Request& request) {
+void refuse_if_anchors_are_in_no_site(ExchangeApi& s, const Request& request) {
   if (!request.query.contains("site")) return;
   Request any = request;
   any.query.erase("site");
@@ -116,7 +116,7 @@ Response anchor_file(ExchangeApi& s, std::string_view format, const Request& req
     check_query(request, {"revision", "site", "bbox", "format"});
   std::uint64_t number = 0;
   const auto anchors = selected_anchors(s.anchors, request, number);
-  if (anchors.empty()) refuse_if_homeless(s, request);
+  if (anchors.empty()) refuse_if_anchors_are_in_no_site(s, request);
   Response response;
   response.body = bytes_of(s, format, anchors, request);
   response.header("Content-Type", std::string(file->type));

@@ -319,7 +319,7 @@ class Importer {
     if (range_m && site.distance_m) note_ratio(row, range_column, *range_m / *site.distance_m);
     if (!range_m) fault.set(k_missing, range_column, "no measured range (range_m, range_cm or range_mm)");
     constexpr double k_any = 1e300;
-    const auto bounded = [&](const Names& names, const row_limits::Bounds& bounds) {
+    const auto bounded = [&](const Names& names, const Bounds& bounds) {
       return value(names, bounds.min, bounds.max);
     };
     m.t_s = value(k_seconds, -k_any, k_any);

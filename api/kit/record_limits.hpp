@@ -5,20 +5,13 @@
 #include <cstdint>
 #include <string_view>
 
+#include "api/kit/value_bounds.hpp"
+
 namespace anchord::api {
 
 /// What a field of a record (site, mission, anchor, floor) may be: the same for every reader of records.
 /// Texts in characters.
 namespace record_limits {
-
-struct Bounds {
-  double min{}, max{};
-  constexpr bool hold(double value) const { return value >= min && value <= max; }
-};
-struct WholeBounds {
-  std::int64_t min{}, max{};
-  constexpr bool hold(std::int64_t value) const { return value >= min && value <= max; }
-};
 
 /// Longest names and texts of facility data; beyond it somebody pastes a document into a field.
 inline constexpr std::size_t k_name = 200;

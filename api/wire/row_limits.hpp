@@ -7,17 +7,10 @@
 #include <numbers>
 #include <optional>
 
+#include "api/kit/value_bounds.hpp"
+
 /// What a field of a range or a fix may be: the same for every reader of rows.
 namespace anchord::api::row_limits {
-
-struct Bounds {
-  double min{}, max{};
-  constexpr bool hold(double value) const { return value >= min && value <= max; }
-};
-struct WholeBounds {
-  std::int64_t min{}, max{};
-  constexpr bool hold(std::int64_t value) const { return value >= min && value <= max; }
-};
 
 inline constexpr WholeBounds k_t_us{0, 4'102'444'800'000'000};  // up to the year 2100
 inline constexpr WholeBounds k_seq{0, INT64_MAX};

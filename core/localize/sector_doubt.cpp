@@ -190,39 +190,39 @@ double share_of(const LateSide& side, double doubted, double believed) {
   return std::clamp((side.gain - doubted) / (believed - doubted), 0.0, 1.0);
 }
 
-}  // namespace
-
-std::size_t add_sector_doubt(const FlightRows& flight, const FlightOptions& options, JointFit& fit) {
+/// Asks every anchor; how many became less certain.
+template <class Widen>
+std::size_t widen_each(const FlightRows& flight, Dims dims, JointFit& fit, const Widen& widen) {
   std::size_t n_wider = 0;
   for (std::size_t i = 0; i < flight.anchors.size(); ++i) {
     if (!fit.state.anchors[i].active) continue;
-    const LateSide side = late_sector(by_bearing(flight, options, fit, i), fit.normal.anchors[i]);
-    const double share = share_of(side, k_doubted_gain, k_believed_gain);
-    if (!(share > 0)) continue;
-    Eigen::Matrix4d& covariance_m2 = fit.anchor_covariance[i];
-    const Eigen::Matrix4d before_m2 = covariance_m2;
-    reach(share * side.moved, options.dims, covariance_m2);
-    widen_in_plane(
-        share * std::max(side.moved.head<2>().norm(), 2 / std::numbers::pi * side.kept * side.delay_m),
-        covariance_m2);
-    n_wider += much_wider(covariance_m2, before_m2, options.dims) ? 1 : 0;
+    const Eigen::Matrix4d before_m2 = fit.anchor_covariance[i];
+    widen(i, fit.anchor_covariance[i]);
+    n_wider += much_wider(fit.anchor_covariance[i], before_m2, dims) ? 1 : 0;
   }
   return n_wider;
 }
 
+}  // namespace
+
+std::size_t add_sector_doubt(const FlightRows& flight, const FlightOptions& options, JointFit& fit) {
+  return widen_each(flight, options.dims, fit, [&](std::size_t i, Eigen::Matrix4d& covariance_m2) {
+    const LateSide side = late_sector(by_bearing(flight, options, fit, i), fit.normal.anchors[i]);
+    const double share = share_of(side, k_doubted_gain, k_believed_gain);
+    if (!(share > 0)) return;
+    reach(share * side.moved, options.dims, covariance_m2);
+    widen_in_plane(
+        share * std::max(side.moved.head<2>().norm(), 2 / std::numbers::pi * side.kept * side.delay_m),
+        covariance_m2);
+  });
+}
+
 std::size_t add_level_doubt(const FlightRows& flight, const FlightOptions& options, JointFit& fit) {
-  std::size_t n_wider = 0;
-  for (std::size_t i = 0; i < flight.anchors.size(); ++i) {
-    if (!fit.state.anchors[i].active) continue;
+  return widen_each(flight, options.dims, fit, [&](std::size_t i, Eigen::Matrix4d& covariance_m2) {
     const LateSide level = late_level(by_level(flight, options, fit, i), fit.normal.anchors[i]);
     const double share = share_of(level, k_doubted_level_gain, k_believed_level_gain);
-    if (!(share > 0)) continue;
-    Eigen::Matrix4d& covariance_m2 = fit.anchor_covariance[i];
-    const Eigen::Matrix4d before_m2 = covariance_m2;
-    reach({0, 0, share * level.moved[2], 0}, options.dims, covariance_m2);
-    n_wider += much_wider(covariance_m2, before_m2, options.dims) ? 1 : 0;
-  }
-  return n_wider;
+    if (share > 0) reach({0, 0, share * level.moved[2], 0}, options.dims, covariance_m2);
+  });
 }
 
 }  // namespace anchord

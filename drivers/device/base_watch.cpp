@@ -2,7 +2,6 @@
 
 #include <cmath>
 #include <cstdio>
-#include <utility>
 
 namespace anchord::device {
 
@@ -26,7 +25,7 @@ void BaseWatch::note(const BaseStation& told) {
   newest_ = told;
   if (!in_flight_ || !at_start_) at_start_ = told;
   if (!trouble_.empty()) return;
-  const auto& [a, b] = std::pair(at_start_->ecef_m, told.ecef_m);
+  const auto &a = at_start_->ecef_m, &b = told.ecef_m;
   const double moved_m = std::hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]);
   if (moved_m <= k_moved_m) return;
   const std::string from = std::to_string(at_start_->station), to = std::to_string(told.station);

@@ -72,7 +72,7 @@ std::string result_words(std::int64_t type) {
     case 13:
       return "the autopilot got the items out of order";
     case 14:
-      return "the autopilot takes no list from this ground station";
+      return "the autopilot accepts no lists from this ground station";
     case 15:
       return "the autopilot canceled the transfer";
     default:

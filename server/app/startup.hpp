@@ -17,7 +17,7 @@ struct DroneEnd {
 };
 
 /// Of the settings drone.*; absent: there is no link. errors: invalid_argument (which setting, and what to
-/// do), not_found, permission (the file of the key)
+/// do), not_found (the file of the key)
 Result<std::optional<DroneEnd>> drone_end(const Config& config);
 
 /// Of the settings mqtt.*; absent: there is no broker. errors: invalid_argument

@@ -40,7 +40,7 @@ const char* in_words(httplib::Error error) {
     case httplib::Error::SSLLoadingCerts:
       return "no TLS connection: the certificates of this machine cannot be read";
     case httplib::Error::SSLServerVerification:
-      return "its certificate is not for this name, or nobody whom this machine trusts signed it";
+      return "its certificate is for another name, or of no authority that this machine trusts";
     default:
       return "the exchange failed";
   }
