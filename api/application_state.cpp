@@ -148,6 +148,7 @@ Application::State::State(Deps d)
                       seen.sites,
                       seen.anchors,
                       seen.missions,
+                      stores.exclusions,
                       missions,
                       contradictions,
                       profiles,

@@ -47,6 +47,7 @@ Json flight_provenance(const CalibrationOrder& order, std::size_t index, const F
           {"copy_of", answer.copy_of ? Json(to_string(order.flights[*answer.copy_of].id)) : Json(nullptr)},
           {"refused", s.refused},
           {"fixes_refused", answer.fixes_refused},
+          {"declared_sha256", flight.declared_sha256},
           {"exclusions", Json::parse(flight.exclusions_json, nullptr, false)},
           {"notes", s.notes}};
 }

@@ -24,6 +24,7 @@ struct CalibrationOrder {
     MissionId id{};
     std::string name, kit;
     std::string exclusions_json;  ///< for the provenance
+    std::string declared_sha256;  ///< for the provenance
     std::size_t n_fixes{}, n_ranges{}, n_anchor_anchor{};
     std::vector<NetworkId> anchors;  ///< that its ranges name, ascending
   };

@@ -72,6 +72,12 @@ void read_height(Fields& fields, FlightOptions& options, std::vector<FieldError>
       fields.error("anchor_height_m", "needs_dims_2",
                    "a held height needs dims 2; with dims 3 give height_prior");
   }
+  if (const auto sigma = fields.number("anchor_height_sigma_m", 0.001, 100)) {
+    options.anchor_height_sigma_m = *sigma;
+    if (!options.anchor_height_m)
+      fields.error("anchor_height_sigma_m", "needs_anchor_height_m",
+                   "the sigma of a height needs that height");
+  }
   const Json* prior = fields.child("height_prior");
   if (prior == nullptr) return;
   Fields inner(*prior, "/height_prior", errors);

@@ -186,12 +186,14 @@ PublishRequest read_publish(const nlohmann::json& body) {
   return out;
 }
 
-/// The calibration as it stands today: gate "moved" is asked against what is published now.
+/// The calibration as it stands today: against what was changed of its flights and its site since, and gate
+/// "moved" against what is published now.
 void ask_whether_moved(CalibrationApi& s, Calibration& calibration) {
-  if (const auto datum = datum_gate(s, calibration)) {
+  for (const auto& gate : {datum_gate(s, calibration), outdated_gate(s, calibration)}) {
+    if (!gate) continue;
     for (auto& estimate : calibration.anchors) {
-      std::erase_if(estimate.gates, [](const Gate& g) { return g.name == "datum"; });
-      estimate.gates.push_back(*datum);
+      std::erase_if(estimate.gates, [&](const Gate& g) { return g.name == gate->name; });
+      estimate.gates.push_back(*gate);
     }
   }
   const auto before = placed(value_or_problem(s.revisions.published(std::nullopt)));

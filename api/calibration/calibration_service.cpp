@@ -10,6 +10,7 @@
 #include "api/calibration/calibration_work.hpp"
 #include "api/calibration/flight_loading.hpp"
 #include "api/calibration/kit_profiles.hpp"
+#include "api/calibration/outdated_gate.hpp"
 #include "api/work/work_desk.hpp"
 #include "core/base/to_wire.hpp"
 #include "core/geo/enu.hpp"
@@ -105,6 +106,7 @@ CalibrationOrder::Flight ordered(const FlightData& flight) {
           flight.mission.name,
           flight.mission.kit,
           exclusions_json(flight.exclusions),
+          declared_sha256(flight.mission),
           flight.fixes.size(),
           flight.rows.size(),
           static_cast<std::size_t>(between),

@@ -173,17 +173,18 @@ void fields(P& p, Packed<P, TrackLimits>& v) {
 }
 template <class P>
 void fields(P& p, Packed<P, FlightOptions>& v) {
-  auto& [dims, method, weights, loss, anchor_height_m, height_prior, min_fix, track, max_gap_s, min_range_m,
-         max_range_m, bias_prior_m, calibrated_bias_prior_m, bias_gate_z, bias_known_sigma_m,
-         unknown_bias_prior_m, delay_prior_m, curve_prior_m, lag_prior_s, lever_prior_m, lever_across_prior_m,
-         lever_arm_sigma_m, pair_sigma_m, pair_bias_prior_m, fixed_bias_m, mad_factor, min_scale_m,
-         correlation_s, floor_sigma_m, priors, outline_m, outline_sigma_m, starts, start_at_priors,
-         level_sigma_db, origin, profile, canceled] = v;
-  p(dims, method, weights, loss, anchor_height_m, height_prior, min_fix, track, max_gap_s, min_range_m,
-    max_range_m, bias_prior_m, calibrated_bias_prior_m, bias_gate_z, bias_known_sigma_m, unknown_bias_prior_m,
-    delay_prior_m, curve_prior_m, lag_prior_s, lever_prior_m, lever_across_prior_m, lever_arm_sigma_m,
-    pair_sigma_m, pair_bias_prior_m, fixed_bias_m, mad_factor, min_scale_m, correlation_s, floor_sigma_m,
-    outline_sigma_m, start_at_priors, level_sigma_db, origin, profile);
+  auto& [dims, method, weights, loss, anchor_height_m, anchor_height_sigma_m, height_prior, min_fix, track,
+         max_gap_s, min_range_m, max_range_m, bias_prior_m, calibrated_bias_prior_m, bias_gate_z,
+         bias_known_sigma_m, unknown_bias_prior_m, delay_prior_m, curve_prior_m, lag_prior_s, lever_prior_m,
+         lever_across_prior_m, lever_arm_sigma_m, pair_sigma_m, pair_bias_prior_m, fixed_bias_m, mad_factor,
+         min_scale_m, correlation_s, floor_sigma_m, priors, outline_m, outline_sigma_m, starts,
+         start_at_priors, level_sigma_db, origin, profile, canceled] = v;
+  p(dims, method, weights, loss, anchor_height_m, anchor_height_sigma_m, height_prior, min_fix, track,
+    max_gap_s, min_range_m, max_range_m, bias_prior_m, calibrated_bias_prior_m, bias_gate_z,
+    bias_known_sigma_m, unknown_bias_prior_m, delay_prior_m, curve_prior_m, lag_prior_s, lever_prior_m,
+    lever_across_prior_m, lever_arm_sigma_m, pair_sigma_m, pair_bias_prior_m, fixed_bias_m, mad_factor,
+    min_scale_m, correlation_s, floor_sigma_m, outline_sigma_m, start_at_priors, level_sigma_db, origin,
+    profile);
   p.map(priors, k_most_anchors);
   p.list(outline_m, k_most_corners);
   p.map(starts, k_most_anchors);
@@ -358,8 +359,8 @@ void fields(P& p, Packed<P, CalibrationAnswer>& v) {
 
 template <class P>
 void fields(P& p, Packed<P, CalibrationOrder::Flight>& v) {
-  auto& [id, name, kit, exclusions, n_fixes, n_ranges, n_anchor_anchor, anchors] = v;
-  p(id, name, kit, exclusions, n_fixes, n_ranges, n_anchor_anchor);
+  auto& [id, name, kit, exclusions, declared, n_fixes, n_ranges, n_anchor_anchor, anchors] = v;
+  p(id, name, kit, exclusions, declared, n_fixes, n_ranges, n_anchor_anchor);
   p.list(anchors, k_most_anchors);
 }
 template <class P>

@@ -4,12 +4,14 @@
 
 #include "api/anchors/anchor_goals.hpp"
 #include "api/calibration/datum_gate.hpp"
+#include "api/calibration/outdated_gate.hpp"
 #include "api/kit/audit.hpp"
 
 namespace anchord {
 class AnchorStore;
 class CalibrationStore;
 class Clock;
+class ExclusionStore;
 class MissionStore;
 class RevisionStore;
 class SiteStore;
@@ -34,6 +36,7 @@ struct CalibrationApi {
   SiteStore& sites;
   AnchorStore& anchors;
   MissionStore& mission_store;
+  ExclusionStore& exclusions;
   MissionService& missions;
   ContradictionWatch& contradictions;
   KitProfiles& profiles;

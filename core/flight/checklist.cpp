@@ -14,9 +14,9 @@ constexpr std::array<std::pair<std::string_view, std::string_view>, 4> k_by_a_pe
      {"airspace", "The airspace is clear and the flight is permitted"},
      {"people", "Nobody is below the flight path"},
      {"pilot", "A pilot is ready with the remote control"}}};
-constexpr std::array<std::string_view, 12> k_by_itself{"drone", "arming",      "parameters", "battery",
-                                                       "rtk",   "corrections", "tag",        "plan",
-                                                       "place", "disk",        "recording",  "fence"};
+constexpr std::array<std::string_view, 13> k_by_itself{
+    "drone", "station", "arming", "parameters", "battery",   "rtk",  "corrections",
+    "tag",   "plan",    "place",  "disk",       "recording", "fence"};
 constexpr double k_fresh_s = 5;  ///< nothing is green on older telemetry
 
 std::string words(const char* format, double value) {
@@ -34,6 +34,15 @@ std::string fix_word(const std::optional<FixClass>& fix) {
   return *fix == FixClass::rtk_fixed   ? "fixed just now"
          : *fix == FixClass::rtk_float ? "RTK float"
                                        : "no RTK";
+}
+
+/// Another ground station under our own id; nullptr: none within k_fresh_s.
+const OtherOnLink* same_station(const DroneStatus& d) {
+  const auto at = std::ranges::find_if(d.others, [](const OtherOnLink& o) {
+    return o.kind == "ground station" && o.system == k_station_system && o.component == k_station_component &&
+           o.silent_s < k_fresh_s;
+  });
+  return at == d.others.end() ? nullptr : &*at;
 }
 
 ChecklistItem item(const char* id, const char* text, bool ok, bool overridable, std::string detail) {
@@ -57,6 +66,14 @@ std::vector<ChecklistItem> make_checklist(const ChecklistFacts& f) {
                        : !d.connected   ? "no heartbeat" + (d.link_fault.empty() ? "" : ": " + d.link_fault)
                        : !stale.empty() ? stale
                                         : d.autopilot + ", " + d.mode + (d.failsafe ? ", failsafe" : "")));
+    if (const auto* same = same_station(d))
+      out.push_back(item("station", "No other ground station has the id of this one", false, true,
+                         (same->sender.empty() ? std::string("one on the link") : "one at " + same->sender) +
+                             words(" sends as system %.0f", same->system) +
+                             words(", component %.0f", same->component) +
+                             ": the autopilot's answers to it can be taken for answers to anchord; give it "
+                             "another system id (QGroundControl: Application Settings, MAVLink, Ground "
+                             "Station ID)"));
     auto arming =
         item("arming", "The autopilot is ready to arm", d.ready_to_arm.value_or(false), true,
              d.ready_to_arm.value_or(false) ? "its pre-arm checks pass"

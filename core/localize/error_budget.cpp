@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/localize/held_height.hpp"
+
 namespace anchord {
 namespace {
 
@@ -226,6 +228,7 @@ std::vector<ErrorBudget> error_budgets(const FlightRows& flight, const JointFit&
     budget.part(ErrorSource::ranging) = even * (1.0 - track) * left;
     budget.part(ErrorSource::floor) =
         options.floor_sigma_m * options.floor_sigma_m * Eigen::Matrix3d::Identity();
+    if (plane) budget.part(ErrorSource::floor) += held_height_m2(flight, fit, i, options);
     const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(left);
     budget.weak = axes.eigenvectors().col(2);
     out.push_back(std::move(budget));

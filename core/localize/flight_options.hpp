@@ -30,6 +30,7 @@ struct FlightOptions {
   /// Dims two only: height of all anchors, ellipsoidal where the track is global, else z of its local frame;
   /// absent: mean height of the track.
   std::optional<double> anchor_height_m{};
+  double anchor_height_sigma_m{0.1};  ///< of that height as it was stated: a tape, a plan
   /// Dims three: about where all anchors are that have no height among their priors, such as the poles they
   /// stand on; same reference.
   struct HeightPrior {

@@ -379,7 +379,7 @@ Result<void> FlightOptions::check() const {
       max_range_m > min_range_m && (!lever_arm_sigma_m || is_lever_arm_sigma(*lever_arm_sigma_m)) &&
       (!max_gap_s || positive(*max_gap_s)) && positive(track.max_speed_mps) &&
       positive(track.max_acceleration_mps2) && positive(track.max_correction_age_s) &&
-      (!anchor_height_m || std::isfinite(*anchor_height_m)) &&
+      (!anchor_height_m || std::isfinite(*anchor_height_m)) && positive(anchor_height_sigma_m) &&
       (!height_prior || (std::isfinite(height_prior->height_m) && positive(height_prior->sigma_m)));
   if (anchor_height_m && dims != Dims::two)
     return make_error(Errc::invalid_argument,

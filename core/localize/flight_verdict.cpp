@@ -11,6 +11,7 @@
 #include "core/localize/error_ellipse.hpp"
 #include "core/localize/gates.hpp"
 #include "core/localize/geometry.hpp"
+#include "core/localize/held_height.hpp"
 #include "core/localize/prior_conflict.hpp"
 #include "core/localize/residual.hpp"
 #include "core/localize/solver.hpp"
@@ -278,6 +279,7 @@ AnchorSolution verdict_of(const FlightRows& flight, const JointFit& fit, std::si
   if (options.dims == Dims::two) {
     solution.fit_covariance_m2.row(2).setZero();
     solution.fit_covariance_m2.col(2).setZero();
+    solution.fit_covariance_m2 += held_height_m2(flight, fit, index, options);
   }
   solution.delay_m = anchor.delay_m;
   solution.delay_sigma_m = std::sqrt(joint(3, 3));
@@ -299,7 +301,7 @@ AnchorSolution verdict_of(const FlightRows& flight, const JointFit& fit, std::si
   estimate.v95_m = ellipse.v95_m;
   fill_gdop(estimate, observations, anchor.position_m, options.dims);
   estimate.verdict = Verdict::ok;
-  solution.determined = Determined::position;
+  solution.determined = options.dims == Dims::two ? Determined::horizontal : Determined::position;
   const double horizontal_sigma_m = ellipse.major_m / std::sqrt(5.991464547107979);
   solution.geometry.sigma_ratio = horizontal_sigma_m / geometry.median_range_m;
   const Priors priors(flight, fit, index, options);

@@ -8,6 +8,7 @@
 #include "core/base/check.hpp"
 #include "core/localize/error_ellipse.hpp"
 #include "core/localize/gates.hpp"
+#include "core/localize/held_height.hpp"
 
 namespace anchord {
 namespace {
@@ -60,7 +61,7 @@ Estimate fuse_estimates(std::span<const Estimate> estimates) {
     out.time = std::max(out.time, estimate.time);
   }
   if (n_ok == 0) return out;
-  const Eigen::Matrix3d covariance = information.inverse();
+  Eigen::Matrix3d covariance = information.inverse();
   const Eigen::Vector3d mean = covariance * weighted;
   double chi2 = 0, rms2 = 0;
   for (const auto& estimate : estimates) {
@@ -74,6 +75,7 @@ Estimate fuse_estimates(std::span<const Estimate> estimates) {
     if (estimate.verdict == Verdict::ok && estimate.best) counted.push_back(&estimate);
   }
   out.gates = worst_gates(counted);
+  hold_height_sigma(counted, covariance);
   const double dof = 3.0 * static_cast<double>(n_ok - 1);
   Hypothesis best;
   best.position.m = mean;

@@ -2,11 +2,14 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdio>
 
+#include "core/localize/chi_square.hpp"
 #include "core/localize/error_model_likelihood.hpp"
 #include "core/localize/geometry.hpp"
+#include "core/localize/held_height.hpp"
 #include "core/localize/joint_lines.hpp"
 #include "core/localize/own_delay.hpp"
 #include "core/localize/residual.hpp"
@@ -124,6 +127,12 @@ Gate blocked(const JointFit& fit, std::size_t index, const FlightOptions& option
   return gate;
 }
 
+/// Of two answers about one anchor: how far apart they are along some axes, and how far they may be.
+struct MovedTest {
+  const char* axes;
+  double chi2, limit;
+};
+
 struct Half {
   Eigen::Vector3d position_m;
   Eigen::Matrix3d covariance_m2;
@@ -212,6 +221,7 @@ std::vector<Gate> gates_of(const FlightRows& flight, const JointFit& fit, std::s
                                ? "probability of this solution; the other one is given as the mirror solution"
                                : "no mirror solution fits as well"));
   if (plane && !estimate.mirror) gates.back().why = "the track is a plane: height not determined";
+  if (options.dims == Dims::two) gates.push_back(held_height_gate(options));
   if (!options.outline_m.empty()) {
     const double outside_m = outside_outline_m(options.outline_m, estimate.best->position.m);
     gates.push_back(
@@ -240,17 +250,28 @@ std::vector<Gate> gates_of(const FlightRows& flight, const JointFit& fit, std::s
 }
 
 Gate moved_gate(const Estimate& now, const Estimate& before, const GateLimits& limits) {
-  const double limit = chi2_quantile(limits.probability, 3);
+  const double in_space = chi2_quantile(limits.probability, 3);
   if (!now.best || !before.best)
-    return {"flights", std::nullopt, limit, false, "one of them has no position"};
+    return {"flights", std::nullopt, in_space, false, "one of them has no position"};
   const Eigen::Vector3d apart = now.best->position.m - before.best->position.m;
   const Eigen::Matrix3d both = now.best->covariance_m2 + before.best->covariance_m2;
-  const double chi2 = apart.dot(both.ldlt().solve(apart));
-  if (!std::isfinite(chi2)) return {"flights", std::nullopt, limit, false, "a covariance is singular"};
+  const Eigen::Matrix2d level = both.topLeftCorner<2, 2>();
+  // Of three axes together a height alone may be off by four of its sigmas.
+  const double one_axis = normal_quantile(0.5 + 0.5 * limits.probability);
+  const std::array tests{
+      MovedTest{"", apart.dot(both.ldlt().solve(apart)), in_space},
+      MovedTest{" horizontally", apart.head<2>().dot(level.ldlt().solve(apart.head<2>())),
+                chi2_limit(true, limits)},
+      MovedTest{" in height", apart.z() * apart.z() / both(2, 2), one_axis * one_axis},
+  };
+  if (!std::ranges::all_of(tests, [](const MovedTest& t) { return std::isfinite(t.chi2); }))
+    return {"flights", std::nullopt, in_space, false, "a covariance is singular"};
+  const MovedTest worst = std::ranges::max(tests, {}, [](const MovedTest& t) { return t.chi2 / t.limit; });
   return at_most(
-      "flights", chi2, limit,
-      text("%.3f m from the earlier position (%.3f m horizontally): chi2 %.1f%s", apart.norm(),
-           apart.head<2>().norm(), chi2, chi2 > limit ? ": it has moved, or one of the two is wrong" : ""));
+      "flights", worst.chi2, worst.limit,
+      text("%.3f m from the earlier position (%.3f m horizontally, %+.3f m in height): chi2%s %.1f%s",
+           apart.norm(), apart.head<2>().norm(), apart.z(), worst.axes, worst.chi2,
+           worst.chi2 > worst.limit ? ": it has moved, or one of the two is wrong" : ""));
 }
 
 Gate flights_gate(double chi2, std::size_t n_flights, const GateLimits& limits) {

@@ -27,7 +27,7 @@ struct GateLimits {
 };
 
 /// Every gate one flight can ask of one anchor, in a fixed order: redundancy, rejected, geometry, precision,
-/// side, outline (where there is one), blocked, own_delay (not in rooms), residual_scale, chi_square, halves,
+/// side, held_height (in the plane), outline (where there is one), blocked, own_delay (not in rooms), residual_scale, chi_square, halves,
 /// second_place, bias, settled.
 ///
 /// chi_square  means of the residuals over two correlation times, each against the residual scale: white
@@ -42,7 +42,8 @@ std::vector<Gate> gates_of(const FlightRows& flight, const JointFit& fit, std::s
                            const GateLimits& limits = {});
 
 /// Did the anchor move between two answers in one frame? Passed when their difference is within what both
-/// covariances allow (three degrees of freedom). Either without a position: not passed, no value.
+/// covariances allow in space, horizontally and in height, each by itself; value and limit are of the one
+/// that is nearest to its limit, or furthest beyond. Either without a position: not passed, no value.
 Gate moved_gate(const Estimate& now, const Estimate& before, const GateLimits& limits = {});
 
 /// The agreement of several flights about their common answer: chi2 with 3 (n - 1) degrees of freedom.

@@ -17,7 +17,7 @@ namespace {
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-constexpr double k_infinity = std::numeric_limits<double>::infinity();
+constexpr double k_unreachable_m = std::numeric_limits<double>::infinity();
 /// The ring lies so far beyond the keep-out that the chords round a corner, 3 m apart, stay outside it.
 constexpr double k_ring_margin_m = 0.35;
 
@@ -40,7 +40,7 @@ bool in_range(const Vector3d& anchor, const std::vector<Candidate>& all, double 
 /// whatever is flown, and would drown the others in the mean.
 std::vector<Vector3d> assumed_anchors(const FlightPlanInput& input, const FlightPlanOptions& options,
                                       const std::vector<Candidate>& all, std::size_t& n_out_of_range) {
-  Vector2d low{k_infinity, k_infinity}, high{-k_infinity, -k_infinity};
+  Vector2d low{k_unreachable_m, k_unreachable_m}, high{-k_unreachable_m, -k_unreachable_m};
   for (const auto& corner : input.outline) {
     low = low.cwiseMin(corner);
     high = high.cwiseMax(corner);
@@ -101,12 +101,12 @@ std::vector<Candidate> candidates(const FlightPlanInput& input, const FlightPlan
   return out;
 }
 
-using Sights = std::vector<std::vector<Sight>>;  // by candidate
+using CandidateSights = std::vector<std::vector<Sight>>;  // by candidate
 
 /// Best candidate not yet chosen, and the value with it.
-std::pair<std::size_t, double> best_of(const Design& design, const Sights& all,
+std::pair<std::size_t, double> best_of(const Design& design, const CandidateSights& all,
                                        const std::vector<bool>& chosen) {
-  std::pair<std::size_t, double> best{all.size(), k_infinity};
+  std::pair<std::size_t, double> best{all.size(), k_unreachable_m};
   for (std::size_t i = 0; i < all.size(); ++i) {
     if (chosen[i]) continue;
     const double value = design.value_with(all[i]);
@@ -115,7 +115,7 @@ std::pair<std::size_t, double> best_of(const Design& design, const Sights& all,
   return best;
 }
 
-std::vector<std::size_t> choose(Design& design, const Sights& all, const FlightPlanOptions& options,
+std::vector<std::size_t> choose(Design& design, const CandidateSights& all, const FlightPlanOptions& options,
                                 std::string& reason) {
   std::vector<bool> chosen(all.size(), false);
   std::vector<std::size_t> out;
@@ -165,7 +165,7 @@ std::vector<Vector3d> way_round(const std::vector<Candidate>& ring, const Bounds
   const double height = std::max(from.z(), to.z());
   const int n = static_cast<int>(ring.size());
   std::vector<Vector3d> best;
-  double best_m = k_infinity;
+  double best_m = k_unreachable_m;
   for (int start = 0; start < n; ++start) {
     const auto at = [&](int i) {
       const Vector3d& p = ring[static_cast<std::size_t>(((i % n) + n) % n)].point_m;
@@ -316,7 +316,7 @@ Result<FlightPlan> plan_flight(const FlightPlanInput& input, const FlightPlanOpt
                                            " m of where the aircraft may fly");
   }
   Design design(plan.assumed_anchors_m, options, {input.outline, input.building_height_m, input.walls});
-  Sights sights;
+  CandidateSights sights;
   for (const auto& c : all) sights.push_back(design.sights(c.point_m));
   std::vector<Candidate> chosen;
   for (const auto i : choose(design, sights, options, plan.reason)) chosen.push_back(all[i]);

@@ -34,6 +34,10 @@ struct CommandReport {
   std::string text;
 };
 
+/// Who this station is on the link, in MAVLink; QGroundControl is the same as it comes. 255: what ArduPilot's
+/// failsafe listens to by default.
+inline constexpr int k_station_system = 255, k_station_component = 190;
+
 /// Somebody else on the aircraft's link: another vehicle, a ground station, a datagram of a stranger. Counted
 /// and shown, never obeyed.
 struct OtherOnLink {

@@ -29,10 +29,10 @@ struct MissionItem {
 enum class ItemList : std::uint8_t { mission = 0, fence = 1 };
 
 struct SessionOptions {
-  mavlink::Address self{255, 190};  ///< 255: what ArduPilot's failsafe listens to by default
-  double confirm_s = 2.0;           ///< neither answered nor seen to be done by then: unconfirmed, given up
-  double repeat_s = 0.5;            ///< within confirm_s, confirmation counted up
-  double climb_s = 15;              ///< a take-off that was accepted shows by then
+  mavlink::Address self{k_station_system, k_station_component};
+  double confirm_s = 2.0;  ///< neither answered nor seen to be done by then: unconfirmed, given up
+  double repeat_s = 0.5;   ///< within confirm_s, confirmation counted up
+  double climb_s = 15;     ///< a take-off that was accepted shows by then
   double max_jump_m = 200;
   std::optional<mavlink::Secret> secret{};  ///< of MAVLink signing; set on the autopilot over a wire
 };

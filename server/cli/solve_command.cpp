@@ -35,7 +35,7 @@ struct Arguments {
   Loss loss{Loss::tukey};
   FixClass min_fix{FixClass::rtk_fixed};
   int dims{3};
-  std::optional<double> bias_m, height_m, max_gap_s, lever_arm_sigma_m;
+  std::optional<double> bias_m, height_m, height_sigma_m, max_gap_s, lever_arm_sigma_m;
   std::vector<double> height_prior;
   double max_correction_age_s{TrackLimits{}.max_correction_age_s};
   std::string profile, out, priors;
@@ -86,6 +86,7 @@ Result<FlightOptions> options_of(const Arguments& a) {
   options.fixed_bias_m = a.bias_m;
   options.track.max_correction_age_s = a.max_correction_age_s;
   options.anchor_height_m = a.height_m;
+  if (a.height_sigma_m) options.anchor_height_sigma_m = *a.height_sigma_m;
   options.max_gap_s = a.max_gap_s;
   options.lever_arm_sigma_m = a.lever_arm_sigma_m;
   if (a.height_prior.size() == 2) options.height_prior = {a.height_prior[0], a.height_prior[1]};
@@ -297,9 +298,15 @@ void add_options(CLI::App& command, Arguments& a) {
            "inverse_variance, or dissertation: as eq 7.11 is printed");
   add_word(command, "--loss", a.loss, k_loss_words, "Weight of large residuals (loss)");
   command.add_option("--dims", a.dims, "3, or 2 with the height held")->check(CLI::IsMember({2, 3}));
-  command.add_option("--height", a.height_m,
-                     "With --dims 2: height of all anchors in metres, ellipsoidal where the track is global "
-                     "(the heights of the table), else z [mean height of the track]");
+  auto* height = command.add_option(
+      "--height", a.height_m,
+      "With --dims 2: height of all anchors in metres, ellipsoidal where the track is global "
+      "(the heights of the table), else z; without it none is acceptable");
+  command
+      .add_option("--height-sigma", a.height_sigma_m,
+                  "One sigma of that height as it was stated, in metres: every region holds it [0.1]")
+      ->needs(height)
+      ->check(CLI::Range(0.001, 100.0));
   command
       .add_option("--height-prior", a.height_prior,
                   "HEIGHT,SIGMA in metres: approximate height of all anchors, such as that of their poles; "

@@ -47,6 +47,32 @@ TEST_F(MissionCorrection, OfAWrongLeverArmMovesTheEstimatesToTheTruth) {
   EXPECT_EQ(live(id).size(), 4U);
 }
 
+TEST_F(MissionCorrection, OfALeverArmHoldsBackWhatWasSolvedBefore) {
+  const MadeFlight made;
+  const auto flight = streamed(made);
+  const auto id = mission("local");
+  deliver(id, flight, 0, 120.5);
+  finish(id);
+  Call options;
+  options.headers["prefer"] = "wait=120";
+  const auto solved =
+      json(call(api::Method::post, "/api/v1/calibrations", R"({"missions":[")" + id + "\"]}", options));
+  const auto outdated = [&] {
+    std::vector<std::string> why;
+    const auto today = json(get("/api/v1/calibrations/" + solved.value("id", "")));
+    for (const auto& gate : today["anchors"][0]["quality"]["gates"])
+      if (gate["name"] == "outdated") why.push_back(gate["why"]);
+    return why;
+  };
+  EXPECT_TRUE(outdated().empty());
+  ASSERT_EQ(correct(id, {{"name", "second"}}, etag(id)).status, 200);
+  EXPECT_TRUE(outdated().empty()) << "its name moves no anchor";
+  ASSERT_EQ(correct(id, arm(flight.ranges.front().tag, 1.5), etag(id)).status, 200);
+  ASSERT_EQ(outdated().size(), 1u);
+  EXPECT_EQ(outdated()[0],
+            "track point, lever arms or kit of flight \"second\": changed since it was solved; solve again");
+}
+
 TEST_F(MissionCorrection, IsShownAndNamedInTheEventsOfTheFlight) {
   const auto id = mission("local");
   finish(id);

@@ -39,6 +39,31 @@ TEST(Checklist, TwoThatAnswerAsOneAreNotGreenAndNobodyOverridesThat) {
   EXPECT_EQ(item.detail, "two autopilots answer as system 1");
 }
 
+TEST(Checklist, NamesAGroundStationThatSendsAsThisOneDoes) {
+  const auto stations = [](const DroneStatus& d) {
+    ChecklistFacts facts;
+    facts.drone = d;
+    std::vector<ChecklistItem> out;
+    for (const auto& i : make_checklist(facts))
+      if (i.id == "station") out.push_back(i);
+    return out;
+  };
+  auto d = hears();
+  EXPECT_TRUE(is_checklist_item("station"));
+  EXPECT_TRUE(stations(d).empty());
+  d.others = {{"10.0.0.7:14550", 255, 190, "ground station", 12, 0.4}};
+  ASSERT_EQ(stations(d).size(), 1u);
+  EXPECT_FALSE(stations(d)[0].green());
+  EXPECT_TRUE(stations(d)[0].overridable);
+  EXPECT_NE(stations(d)[0].detail.find("one at 10.0.0.7:14550 sends as system 255, component 190"),
+            std::string::npos)
+      << stations(d)[0].detail;
+  d.others[0].silent_s = 8;
+  EXPECT_TRUE(stations(d).empty()) << "it has gone";
+  d.others = {{"10.0.0.7:14550", 254, 190, "ground station", 12, 0.4}};
+  EXPECT_TRUE(stations(d).empty());
+}
+
 TEST(Checklist, SaysWhyNobodyIsFollowed) {
   DroneStatus d;
   EXPECT_EQ(drone_item(d).detail, "no heartbeat");

@@ -144,6 +144,26 @@ TEST(Gates, AreNeverPassedByAnEstimateWithoutAny) {
   EXPECT_FALSE(estimate.acceptable());
 }
 
+TEST(Gates, TellHeightsApartThatThreeAxesTogetherWouldPass) {
+  const auto at = [](const Eigen::Vector3d& m) {
+    Estimate e;
+    e.best.emplace();
+    e.best->position.m = m;
+    e.best->covariance_m2 = Eigen::Vector3d(0.03, 0.03, 0.14).array().square().matrix().asDiagonal();
+    return e;
+  };
+  const Estimate before = at({1, 2, 3});
+  // Of sigma 0.198 m of the difference: 3.54 sigmas, chi2 12.5, below 16.3 of three degrees of freedom.
+  const Gate higher = moved_gate(at({1, 2, 3.7}), before);
+  EXPECT_FALSE(higher.passed) << higher.why;
+  EXPECT_NEAR(*higher.value, 12.5, 0.01);
+  EXPECT_NEAR(higher.limit, 10.83, 0.02) << "chi-square, 99.9 %, one degree of freedom";
+  EXPECT_TRUE(moved_gate(at({1, 2, 3.6}), before).passed);
+  // Two degrees of freedom: 13.8.
+  EXPECT_FALSE(moved_gate(at({1.11, 2.115, 3}), before).passed);
+  EXPECT_TRUE(moved_gate(at({1.1, 2.1, 3}), before).passed);
+}
+
 TEST(Gates, TellAMovedAnchorFromOneThatStayed) {
   MadeFlight first;
   first.turn_rate_radps = 0.2;

@@ -10,6 +10,7 @@
 #include "core/localize/flight_copies.hpp"
 #include "core/localize/flight_digest.hpp"
 #include "core/localize/flight_solver.hpp"
+#include "core/localize/fuse.hpp"
 #include "tests/core/localize/flight_support.hpp"
 
 namespace anchord::placing_test {
@@ -146,6 +147,83 @@ TEST(Heights, InTwoDimensionsHaveNoMirror) {
     EXPECT_FALSE(anchor.estimate.mirror);
   }
   EXPECT_LT(worst_m(s.value(), made), 0.1);
+}
+
+const Gate* held_height(const AnchorSolution& anchor) {
+  const auto& gates = anchor.estimate.gates;
+  const auto at = std::ranges::find(gates, "held_height", &Gate::name);
+  return at == gates.end() ? nullptr : &*at;
+}
+
+TEST(Heights, NobodyStatedAreNeitherMeasuredNorAcceptable) {
+  MadeFlight made;
+  for (auto& a : made.anchors) a.z() = 2.5;
+  const auto s = solve_flight(make_flight(made), {.dims = Dims::two});
+  ASSERT_TRUE(s);
+  for (const auto& anchor : s.value().anchors) {
+    EXPECT_EQ(anchor.determined, Determined::horizontal);
+    EXPECT_GT(anchor.estimate.v95_m, 5.0) << "a storey of sigma";
+    EXPECT_FALSE(anchor.estimate.acceptable());
+    ASSERT_TRUE(held_height(anchor));
+    EXPECT_FALSE(held_height(anchor)->passed);
+    EXPECT_FALSE(held_height(anchor)->value);
+  }
+}
+
+TEST(Heights, StatedAreAsUncertainAsTheyWereStated) {
+  MadeFlight made;
+  for (auto& a : made.anchors) a.z() = 2.5;
+  const FlightData flight = make_flight(made);
+  FlightOptions options{.dims = Dims::two, .anchor_height_m = 2.5};
+  options.floor_sigma_m = 0;
+  for (const double sigma_m : {0.1, 0.4, 0.8}) {
+    options.anchor_height_sigma_m = sigma_m;
+    const auto s = solve_flight(flight, options);
+    ASSERT_TRUE(s);
+    for (const auto& anchor : s.value().anchors) {
+      EXPECT_EQ(anchor.determined, Determined::horizontal);
+      EXPECT_NEAR(anchor.estimate.v95_m, 1.96 * sigma_m, 1e-3);
+      ASSERT_TRUE(held_height(anchor));
+      EXPECT_EQ(held_height(anchor)->passed, sigma_m <= 0.5) << held_height(anchor)->why;
+    }
+  }
+}
+
+TEST(Heights, OfOneAnchorThatWasStatedWrongMovesItAsItsCovarianceSays) {
+  MadeFlight made;
+  made.height_swing_m = 0;
+  for (auto& a : made.anchors) a.z() = 2.5;
+  FlightOptions options{.dims = Dims::two, .anchor_height_m = 2.5};
+  options.floor_sigma_m = 0;
+  // What all anchors share is known, and takes no part of it.
+  options.fixed_bias_m = made.bias_m;
+  options.lever_prior_m = options.curve_prior_m = options.lag_prior_s = 1e-4;
+  const auto right = solve_flight(make_flight(made), options);
+  made.anchors[0].z() = 2.55;  // little, so that the loss rejects no range for it
+  const auto wrong = solve_flight(make_flight(made), options);
+  ASSERT_TRUE(right && wrong);
+  const Eigen::Matrix3d& c = right.value().anchors[0].estimate.best->covariance_m2;
+  const Eigen::Vector2d told_m = -0.05 * c.col(2).head<2>() / c(2, 2);
+  const Eigen::Vector2d moved_m = (wrong.value().anchors[0].estimate.best->position.m -
+                                   right.value().anchors[0].estimate.best->position.m)
+                                      .head<2>();
+  EXPECT_GT(moved_m.norm(), 0.004);
+  EXPECT_LT((moved_m - told_m).norm(), 0.2 * moved_m.norm()) << told_m << " / " << moved_m;
+}
+
+TEST(Heights, StatedGetNoBetterByTheNumberOfFlights) {
+  std::vector<Estimate> flights;
+  for (std::uint64_t seed = 1; seed <= 4; ++seed) {
+    MadeFlight made;
+    made.seed = seed;
+    for (auto& a : made.anchors) a.z() = 2.5;
+    const auto s = solve_flight(make_flight(made), {.dims = Dims::two, .anchor_height_m = 2.5});
+    ASSERT_TRUE(s);
+    flights.push_back(s.value().anchors[0].estimate);
+  }
+  const Estimate fused = fuse_estimates(flights);
+  EXPECT_GE(fused.v95_m, 1.95 * 0.1);
+  EXPECT_LT(fused.h95_m, flights[0].h95_m);
 }
 
 TEST(Heights, AreEllipsoidalWhereTheTrackIsGlobal) {

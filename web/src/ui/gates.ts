@@ -34,6 +34,11 @@ const WORDS: Record<string, Words> = {
     unit: '%',
     least: true,
   },
+  held_height: {
+    passes: 'The height was stated by a person, σ',
+    fails: 'The height was not measured, nor stated well enough, σ',
+    unit: 'm',
+  },
   outline: { passes: 'Inside the outline of the building', fails: 'Outside the outline of the building', unit: 'm' },
   blocked: {
     passes: 'Residuals are like those of the other anchors',
@@ -61,6 +66,11 @@ const WORDS: Record<string, Words> = {
   datum: {
     passes: 'Flights before the site’s datum was changed',
     fails: 'Flown before the site’s datum was changed: former coordinates',
+    unit: '',
+  },
+  outdated: {
+    passes: 'Solved with what is declared now',
+    fails: 'Lever arms, kit or exclusions were changed since: solve again',
     unit: '',
   },
   moved: { passes: 'Same position as before', fails: 'It has moved, or one of the positions is wrong', unit: 'χ²' },

@@ -89,8 +89,9 @@ export function usePlan(id: string | null) {
     set_back(draft.at_ms);
   };
   const now = tick.value;
+  // Of what is kept now: effects come late on a busy page, and a place that was typed since must not be taken back.
   useEffect(() => {
-    if (origin === null) set_origin(origin_of(plan, flown_at()));
+    if (origin === null) set_origin((kept) => kept ?? origin_of(plan, flown_at()));
   }, [now, origin, plan]);
   const guarded = async (what: string, work: () => Promise<void>): Promise<void> => {
     set_busy(what);
