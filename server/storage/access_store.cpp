@@ -9,7 +9,7 @@ namespace {
 constexpr const char* k_answer =
     "SELECT idempotency_key, principal, request_sha256_hex, body, status, created_t_ns, location, etag "
     "FROM stored_answer WHERE principal = ?1 AND idempotency_key = ?2";
-constexpr const char* k_keep =
+constexpr const char* k_access_keep =
     "INSERT INTO stored_answer (principal, idempotency_key, request_sha256_hex, status, body, created_t_ns, "
     "location, etag) VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8) ON CONFLICT (principal, idempotency_key) DO "
     "UPDATE "
@@ -29,7 +29,7 @@ constexpr const char* k_newest_entry =
 constexpr const char* k_append =
     "INSERT INTO audit (number, t_ns, who, what, from_where, result, chain_sha256_hex) "
     "VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7)";
-constexpr const char* k_entries =
+constexpr const char* k_access_entries =
     "SELECT t_ns, who, what, from_where, result FROM audit ORDER BY number DESC LIMIT ?1";
 constexpr const char* k_chain =
     "SELECT number, t_ns, who, what, from_where, result, chain_sha256_hex FROM audit ORDER BY number";
@@ -121,7 +121,7 @@ class SqlAccessStore final : public AccessStore {
   }
   Result<std::vector<AuditEntry>> audit(std::size_t limit) override {
     return read_value<std::vector<AuditEntry>>(gate_, [&](Connection& c) -> Result<std::vector<AuditEntry>> {
-      Query query(c, k_entries);
+      Query query(c, k_access_entries);
       query << row_limit(limit);
       std::vector<AuditEntry> found;
       while (query.step()) found.push_back(read_entry(query));
@@ -175,7 +175,7 @@ class SqlAccessStore final : public AccessStore {
 }  // namespace
 
 bool put_answer(Connection& c, const StoredAnswer& answer, std::int64_t expired_ran_ns) {
-  Query query(c, k_keep);
+  Query query(c, k_access_keep);
   query << answer.principal << answer.key << answer.request_sha256_hex << answer.status
         << std::as_bytes(std::span{answer.body}) << answer.created_ran_ns << answer.location << answer.etag
         << expired_ran_ns;

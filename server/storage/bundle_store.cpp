@@ -21,9 +21,9 @@ constexpr std::size_t k_weight = 20'000;
 constexpr const char* k_mission_state = "SELECT state, name FROM mission WHERE mission_key = ?1";
 constexpr const char* k_any_mission = "SELECT mission_key FROM mission WHERE id = ?1";
 constexpr const char* k_any_site = "SELECT 1 FROM site WHERE id = ?1";
-constexpr const char* k_insert_cir =
+constexpr const char* k_bundle_insert_cir =
     "INSERT INTO cir (range_id, dt_ps, first_path_idx, preamble_count, re_im) VALUES (?1, ?2, ?3, ?4, ?5)";
-constexpr const char* k_revisions = "SELECT number FROM revision";
+constexpr const char* k_bundle_revisions = "SELECT number FROM revision";
 constexpr const char* k_frame_named = "SELECT id FROM local_frame WHERE name = ?1";
 constexpr const char* k_count_fixes_anew =
     "INSERT INTO mission_fixes (mission_key, n_fixes) SELECT mission_key, count(*) FROM fix WHERE "
@@ -131,7 +131,7 @@ class Reader {
       named.insert(whole_of(row[2]));
     }
     for (const std::int64_t number : named) whole = whole && theirs.contains(number);
-    Query query(c_, k_revisions);
+    Query query(c_, k_bundle_revisions);
     while (query.step()) mine.insert(query.integer());
     for (const std::int64_t number : mine) others = others || !theirs.contains(number);
     revisions_out_ = others || !whole;
@@ -404,7 +404,7 @@ class Reader {
   }
 
   void add_cir(std::int64_t range, const BundleRow& row) {
-    Query query(c_, k_insert_cir);
+    Query query(c_, k_bundle_insert_cir);
     query << range;
     for (std::size_t i = row.size() - k_cir_cells; i < row.size(); ++i)
       bind_cell(query, row[i], i + 1 == row.size() ? CellKind::bytes : CellKind::real);

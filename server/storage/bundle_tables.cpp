@@ -33,24 +33,25 @@ constexpr const char* k_of_revisions =
 constexpr const char* k_of_anchors =
     "t.network_id IN (SELECT d.network_id FROM device_seen d WHERE d.mission_key = ?1 AND d.kind = 1)";
 
-constexpr const char* k_site_columns =
+constexpr const char* k_bundle_site_columns =
     "u id t name r origin_lat_deg r origin_lon_deg r origin_height_m t outline_geojson t crs_frame "
     "r crs_epoch_year r base_sigma_m t base_source i created_t_ns i version i projected_epsg";
-constexpr const char* k_frame_columns = "u id t name u site_id t definition_json i created_t_ns i version";
-constexpr const char* k_plan_columns =
+constexpr const char* k_bundle_frame_columns =
+    "u id t name u site_id t definition_json i created_t_ns i version";
+constexpr const char* k_bundle_plan_columns =
     "u id t name u site_id t document_json i created_t_ns i changed_t_ns i version";
-constexpr const char* k_anchor_columns =
+constexpr const char* k_bundle_anchor_columns =
     "u id i network_id u site_id t name t building t floor t space t asset_tag t ifc_guid i retired "
     "i created_t_ns i version";
 constexpr const char* k_external_id_columns = "u anchor_id i ordinal t system t external_id";
 
 constexpr std::array k_lines{
-    Line{BundlePart::site, "site", k_site_columns, "id", "t.id = ?1", "t.id"},
-    Line{BundlePart::site, "local_frame", k_frame_columns, "id", "t.site_id = ?1", "t.id"},
+    Line{BundlePart::site, "site", k_bundle_site_columns, "id", "t.id = ?1", "t.id"},
+    Line{BundlePart::site, "local_frame", k_bundle_frame_columns, "id", "t.site_id = ?1", "t.id"},
     Line{BundlePart::shared, "kit_profile", "t kit i version i t_ns t changed_by t source t profile_json",
          "kit version", "t.kit = (SELECT m.kit FROM mission m WHERE m.mission_key = ?1)", "t.version"},
-    Line{BundlePart::plan, "plan", k_plan_columns, "id", "t.id = ?1", "t.id"},
-    Line{BundlePart::shared, "anchor", k_anchor_columns, "network_id", k_of_anchors, "t.network_id"},
+    Line{BundlePart::plan, "plan", k_bundle_plan_columns, "id", "t.id = ?1", "t.id"},
+    Line{BundlePart::shared, "anchor", k_bundle_anchor_columns, "network_id", k_of_anchors, "t.network_id"},
     Line{BundlePart::shared, "anchor_external_id", k_external_id_columns, "anchor_id ordinal",
          "t.anchor_id IN (SELECT a.id FROM anchor a JOIN device_seen d ON d.network_id = a.network_id WHERE "
          "d.mission_key = ?1 AND d.kind = 1)",
@@ -139,10 +140,11 @@ constexpr const char* k_of_tiles =
     "ON b.id = f.building_id WHERE i.named = 1 AND b.site_id = ?1)";
 /// Of a site, beside its flights: ?1 is the site.
 constexpr std::array k_site_lines{
-    Line{BundlePart::site, "site", k_site_columns, "id", "t.id = ?1", "t.id"},
-    Line{BundlePart::site, "local_frame", k_frame_columns, "id", "t.site_id = ?1", "t.id"},
-    Line{BundlePart::plan, "plan", k_plan_columns, "id", "t.site_id = ?1", "t.id"},
-    Line{BundlePart::shared, "anchor", k_anchor_columns, "network_id", "t.site_id = ?1", "t.network_id"},
+    Line{BundlePart::site, "site", k_bundle_site_columns, "id", "t.id = ?1", "t.id"},
+    Line{BundlePart::site, "local_frame", k_bundle_frame_columns, "id", "t.site_id = ?1", "t.id"},
+    Line{BundlePart::plan, "plan", k_bundle_plan_columns, "id", "t.site_id = ?1", "t.id"},
+    Line{BundlePart::shared, "anchor", k_bundle_anchor_columns, "network_id", "t.site_id = ?1",
+         "t.network_id"},
     Line{BundlePart::shared, "anchor_external_id", k_external_id_columns, "anchor_id ordinal",
          "t.anchor_id IN (SELECT a.id FROM anchor a WHERE a.site_id = ?1)", "t.anchor_id, t.ordinal"},
     Line{BundlePart::site, "building+", "u id u site_id t name r height_m i created_t_ns i version", "id",

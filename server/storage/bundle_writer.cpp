@@ -8,12 +8,13 @@
 namespace anchord::sql {
 namespace {
 
-constexpr const char* k_sites =
+constexpr const char* k_bundle_writer_sites =
     "SELECT s.id FROM site s WHERE s.id IN (SELECT m.site_id FROM mission m WHERE m.mission_key = ?1) OR "
     "s.id IN (SELECT a.site_id FROM anchor a JOIN device_seen d ON d.network_id = a.network_id WHERE "
     "d.mission_key = ?1 AND d.kind = 1)";
 constexpr const char* k_plans = "SELECT id, site_id FROM plan";
-constexpr const char* k_procedure = "SELECT state_json FROM mission_procedure WHERE mission_key = ?1";
+constexpr const char* k_bundle_writer_procedure =
+    "SELECT state_json FROM mission_procedure WHERE mission_key = ?1";
 constexpr const char* k_models = "SELECT id FROM model";
 constexpr const char* k_provenance =
     "SELECT c.settings_json, c.provenance_json FROM calibration c JOIN calibration_mission m ON "
@@ -34,7 +35,7 @@ std::string all_text(Connection& c, const char* sql, std::int64_t mission) {
 
 Named named_by(Connection& c, std::int64_t mission) {
   Named out;
-  const std::string flown = all_text(c, k_procedure, mission);
+  const std::string flown = all_text(c, k_bundle_writer_procedure, mission);
   std::string told;
   {
     Query query(c, k_provenance);
@@ -45,7 +46,7 @@ Named named_by(Connection& c, std::int64_t mission) {
     }
   }
   {
-    Query query(c, k_sites);
+    Query query(c, k_bundle_writer_sites);
     query << mission;
     while (query.step()) out.sites.insert(query.id<SiteId>().uuid);
   }

@@ -8,13 +8,13 @@
 namespace anchord::sql {
 namespace {
 
-constexpr const char* k_insert =
+constexpr const char* k_calibration_insert =
     "INSERT INTO calibration (id, frame, origin_lat_deg, origin_lon_deg, origin_height_m, settings_json, "
     "created_t_ns, provenance_json) "
     "VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8) ON CONFLICT DO NOTHING RETURNING calibration_key";
 constexpr const char* k_insert_mission =
     "INSERT INTO calibration_mission (calibration_key, ordinal, mission_key) VALUES (?1, ?2, ?3)";
-constexpr const char* k_columns =
+constexpr const char* k_calibration_columns =
     "SELECT calibration_key, id, frame, origin_lat_deg, origin_lon_deg, origin_height_m, settings_json, "
     "created_t_ns, provenance_json FROM calibration ";
 constexpr const char* k_insert_evidence =
@@ -25,11 +25,11 @@ constexpr const char* k_evidence =
 constexpr const char* k_missions =
     "SELECT m.id FROM calibration_mission cm JOIN mission m ON m.mission_key = cm.mission_key "
     "WHERE cm.calibration_key = ?1 ORDER BY cm.ordinal";
-constexpr const char* k_key = "SELECT calibration_key FROM calibration WHERE id = ?1";
+constexpr const char* k_calibration_key = "SELECT calibration_key FROM calibration WHERE id = ?1";
 constexpr const char* k_revisions_of = "SELECT count(*) FROM revision WHERE calibration_key = ?1";
-constexpr const char* k_remove = "DELETE FROM calibration WHERE calibration_key = ?1";
+constexpr const char* k_calibration_remove = "DELETE FROM calibration WHERE calibration_key = ?1";
 
-constexpr const char* k_newest = "SELECT coalesce(max(number), 0) FROM revision";
+constexpr const char* k_calibration_newest = "SELECT coalesce(max(number), 0) FROM revision";
 constexpr const char* k_insert_revision =
     "INSERT INTO revision (number, calibration_key, published_t_ns, published_by, note) VALUES (?1, ?2, ?3, "
     "?4, ?5)";
@@ -46,7 +46,7 @@ constexpr const char* k_insert_override =
     "INSERT INTO revision_override (number, network_id, reason, overridden_by) VALUES (?1, ?2, ?3, ?4)";
 constexpr const char* k_override =
     "SELECT reason, overridden_by FROM revision_override WHERE number = ?1 AND network_id = ?2";
-constexpr const char* k_revisions =
+constexpr const char* k_calibration_revisions =
     "SELECT r.number, c.id, r.published_t_ns, r.published_by, r.note FROM revision r "
     "JOIN calibration c ON c.calibration_key = r.calibration_key "
     "WHERE ?1 = 0 OR r.number < ?1 ORDER BY r.number DESC LIMIT ?2";
@@ -59,17 +59,17 @@ constexpr const char* k_position_columns =
     "JOIN calibration c ON c.calibration_key = r.calibration_key ";
 
 std::optional<std::int64_t> key_of(Connection& c, const CalibrationId& id) {
-  Query query(c, k_key);
+  Query query(c, k_calibration_key);
   query << id;
   return query.step() ? std::optional(query.integer()) : std::nullopt;
 }
 
 std::uint64_t newest_revision(Connection& c) {
-  Query query(c, k_newest);
+  Query query(c, k_calibration_newest);
   return query.step() ? query.as<std::uint64_t>() : 0;
 }
 
-Calibration read(Connection& c, Query& query) {
+Calibration read_calibration(Connection& c, Query& query) {
   Calibration found;
   const std::int64_t key = query.integer();
   found.id = query.id<CalibrationId>();
@@ -136,7 +136,7 @@ std::optional<Error> insert_calibration(Connection& c, const Calibration& calibr
   if (auto error = check_duplicates(calibration)) return error;
   std::optional<std::int64_t> key;
   {
-    Query query(c, k_insert);
+    Query query(c, k_calibration_insert);
     query << calibration.id << static_cast<int>(calibration.frame);
     bind_wgs84(query, calibration.origin);
     query << calibration.settings << calibration.created << calibration.provenance;
@@ -161,20 +161,20 @@ std::optional<Error> insert_calibration(Connection& c, const Calibration& calibr
 }
 
 Result<Calibration> find_calibration(Connection& c, const CalibrationId& id) {
-  Query query(c, std::string(k_columns) + "WHERE id = ?1");
+  Query query(c, std::string(k_calibration_columns) + "WHERE id = ?1");
   query << id;
   if (!query.step()) return absent("calibration", id);
-  return read(c, query);
+  return read_calibration(c, query);
 }
 
 Result<std::vector<Calibration>> list_calibrations(Connection& c, std::int64_t limit,
                                                    const std::optional<CalibrationId>& after) {
-  Query query(c, std::string(k_columns) +
+  Query query(c, std::string(k_calibration_columns) +
                      (after ? "WHERE id < ?1 ORDER BY id DESC LIMIT ?2" : "ORDER BY id DESC LIMIT ?1"));
   if (after) query << *after;
   query << limit;
   std::vector<Calibration> found;
-  while (query.step()) found.push_back(read(c, query));
+  while (query.step()) found.push_back(read_calibration(c, query));
   return found;
 }
 
@@ -193,7 +193,7 @@ std::optional<Error> remove_calibration(Connection& c, const CalibrationId& id) 
   if (used.step() && used.integer() > 0) {
     return make_error(Errc::conflict, "calibration " + to_string(id) + " was published");
   }
-  Query query(c, k_remove);
+  Query query(c, k_calibration_remove);
   query << *key;
   query.run();
   return std::nullopt;
@@ -242,7 +242,7 @@ Result<Revision> publish_revision(Connection& c, const CalibrationId& id,
 }
 
 Result<std::vector<Revision>> list_revisions(Connection& c, std::int64_t limit, std::uint64_t before) {
-  Query query(c, k_revisions);
+  Query query(c, k_calibration_revisions);
   query << before << limit;
   std::vector<Revision> found;
   while (query.step()) {

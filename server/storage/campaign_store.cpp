@@ -8,17 +8,17 @@
 namespace anchord::sql {
 namespace {
 
-constexpr const char* k_insert =
+constexpr const char* k_campaign_insert =
     "INSERT INTO campaign (id, name, radio, note, truth_sigma_m, created_t_ns, version) "
     "VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7)";
-constexpr const char* k_named = "SELECT 1 FROM campaign WHERE name = ?1 AND id <> ?2";
-constexpr const char* k_update =
+constexpr const char* k_campaign_named = "SELECT 1 FROM campaign WHERE name = ?1 AND id <> ?2";
+constexpr const char* k_campaign_update =
     "UPDATE campaign SET name = ?2, radio = ?3, note = ?4, truth_sigma_m = ?5, version = ?6 "
     "WHERE id = ?1 AND version = ?7 RETURNING campaign_key";
-constexpr const char* k_columns =
+constexpr const char* k_campaign_columns =
     "SELECT id, name, radio, note, truth_sigma_m, created_t_ns, version FROM campaign ";
-constexpr const char* k_key = "SELECT campaign_key FROM campaign WHERE id = ?1";
-constexpr const char* k_remove = "DELETE FROM campaign WHERE id = ?1 RETURNING campaign_key";
+constexpr const char* k_campaign_key = "SELECT campaign_key FROM campaign WHERE id = ?1";
+constexpr const char* k_campaign_remove = "DELETE FROM campaign WHERE id = ?1 RETURNING campaign_key";
 constexpr const char* k_setting_columns =
     "s.name, s.environment, s.distance_m, s.los, s.heading_deg, s.height_difference_m, s.material, "
     "s.thickness_m, s.truth_sigma_m";
@@ -30,10 +30,10 @@ constexpr const char* k_insert_sample =
     "INSERT INTO campaign_sample (setting_key, t_ns, seq, range_m, rx_dbm, fp_dbm, fp_amp1, fp_amp2, "
     "fp_amp3, cir_power, preamble_count, std_noise, max_noise, fp_index) VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, "
     "?8, ?9, ?10, ?11, ?12, ?13, ?14) ON CONFLICT DO NOTHING RETURNING sample_id";
-constexpr const char* k_insert_cir =
+constexpr const char* k_campaign_insert_cir =
     "INSERT INTO campaign_cir (sample_id, dt_ps, first_path_idx, preamble_count, re_im) VALUES (?1, ?2, ?3, "
     "?4, ?5)";
-constexpr const char* k_select_cir =
+constexpr const char* k_campaign_select_cir =
     "SELECT dt_ps, first_path_idx, preamble_count, re_im FROM campaign_cir WHERE sample_id = ?1";
 constexpr const char* k_sample_columns =
     "x.sample_id, x.t_ns, x.seq, x.range_m, x.rx_dbm, x.fp_dbm, x.fp_amp1, x.fp_amp2, x.fp_amp3, "
@@ -44,7 +44,7 @@ Error no_campaign(const CampaignId& id) {
   return make_error(Errc::not_found, "no campaign " + to_string(id));
 }
 
-CampaignRecord read(Query& query) {
+CampaignRecord read_campaign(Query& query) {
   CampaignRecord c;
   c.id = query.id<CampaignId>();
   c.name = query.text();
@@ -92,7 +92,7 @@ CampaignStore::StoredSample read_sample(Query& query) {
 }
 
 std::optional<std::int64_t> key_of(Connection& c, const CampaignId& id) {
-  Query query(c, k_key);
+  Query query(c, k_campaign_key);
   query << id;
   if (!query.step()) return std::nullopt;
   return query.integer();
@@ -100,7 +100,7 @@ std::optional<std::int64_t> key_of(Connection& c, const CampaignId& id) {
 
 void take_cir(Connection& c, CampaignStore::StoredSample& row) {
   if (!row.has_cir) return;
-  Query query(c, k_select_cir);
+  Query query(c, k_campaign_select_cir);
   query << row.id;
   if (query.step()) row.sample.cir = read_cir_columns(query);
 }
@@ -112,7 +112,7 @@ class SqlCampaignStore final : public CampaignStore {
   Result<void> insert(const CampaignRecord& campaign) override {
     return write_void(gate_, [&](Connection& c) -> std::optional<Error> {
       if (auto taken = name_taken(c, campaign)) return taken;
-      Query query(c, k_insert);
+      Query query(c, k_campaign_insert);
       query << campaign.id << campaign.name << campaign.radio << campaign.note << campaign.truth_sigma_m
             << campaign.created << campaign.version;
       query.run();
@@ -124,7 +124,7 @@ class SqlCampaignStore final : public CampaignStore {
     return write_void(gate_, [&](Connection& c) -> std::optional<Error> {
       if (!key_of(c, campaign.id)) return no_campaign(campaign.id);
       if (auto taken = name_taken(c, campaign)) return taken;
-      Query query(c, k_update);
+      Query query(c, k_campaign_update);
       query << campaign.id << campaign.name << campaign.radio << campaign.note << campaign.truth_sigma_m
             << (expected_version + 1) << expected_version;
       if (query.returned()) return std::nullopt;
@@ -134,19 +134,19 @@ class SqlCampaignStore final : public CampaignStore {
 
   Result<CampaignRecord> campaign(const CampaignId& id) override {
     return read_value<CampaignRecord>(gate_, [&](Connection& c) -> Result<CampaignRecord> {
-      Query query(c, std::string(k_columns) + "WHERE id = ?1");
+      Query query(c, std::string(k_campaign_columns) + "WHERE id = ?1");
       query << id;
       if (!query.step()) return no_campaign(id);
-      return read(query);
+      return read_campaign(query);
     });
   }
 
   Result<CampaignRecord> campaign(std::string_view name) override {
     return read_value<CampaignRecord>(gate_, [&](Connection& c) -> Result<CampaignRecord> {
-      Query query(c, std::string(k_columns) + "WHERE name = ?1");
+      Query query(c, std::string(k_campaign_columns) + "WHERE name = ?1");
       query << name;
       if (!query.step()) return make_error(Errc::not_found, "no campaign " + std::string(name));
-      return read(query);
+      return read_campaign(query);
     });
   }
 
@@ -154,19 +154,19 @@ class SqlCampaignStore final : public CampaignStore {
                                                 const std::optional<CampaignId>& after) override {
     return read_value<std::vector<CampaignRecord>>(
         gate_, [&](Connection& c) -> Result<std::vector<CampaignRecord>> {
-          Query query(c, std::string(k_columns) + (after ? "WHERE id < ?1 ORDER BY id DESC LIMIT ?2"
-                                                         : "ORDER BY id DESC LIMIT ?1"));
+          Query query(c, std::string(k_campaign_columns) + (after ? "WHERE id < ?1 ORDER BY id DESC LIMIT ?2"
+                                                                  : "ORDER BY id DESC LIMIT ?1"));
           if (after) query << *after;
           query << row_limit(limit);
           std::vector<CampaignRecord> found;
-          while (query.step()) found.push_back(read(query));
+          while (query.step()) found.push_back(read_campaign(query));
           return found;
         });
   }
 
   Result<void> remove(const CampaignId& id) override {
     return write_void(gate_, [&](Connection& c) -> std::optional<Error> {
-      Query query(c, k_remove);
+      Query query(c, k_campaign_remove);
       query << id;
       if (query.returned()) return std::nullopt;
       return no_campaign(id);
@@ -298,7 +298,7 @@ class SqlCampaignStore final : public CampaignStore {
 
  private:
   static std::optional<Error> name_taken(Connection& c, const CampaignRecord& campaign) {
-    Query query(c, k_named);
+    Query query(c, k_campaign_named);
     query << campaign.name << campaign.id;
     if (!query.step()) return std::nullopt;
     return make_error(Errc::conflict, "there is a campaign named " + campaign.name);
@@ -316,7 +316,7 @@ class SqlCampaignStore final : public CampaignStore {
     const auto id = query.returned();
     if (!id) return false;
     if (x.cir) {
-      Query cir(c, k_insert_cir);
+      Query cir(c, k_campaign_insert_cir);
       cir << *id << stored_dt_ps(*x.cir) << x.cir->first_path_idx << x.cir->preamble_count
           << std::as_bytes(std::span{x.cir->re_im});
       cir.run();

@@ -14,7 +14,7 @@ constexpr const char* k_due =
     "m.mission_key AND (a.held = 1 OR a.n_ranges = (SELECT CAST(coalesce(sum(d.n_ranges), 0) AS BIGINT) / 2 "
     "FROM device_seen d WHERE d.mission_key = m.mission_key))) ORDER BY m.finished_t_ns, m.mission_key LIMIT "
     "?3";
-constexpr const char* k_state = "SELECT state FROM mission WHERE mission_key = ?1";
+constexpr const char* k_cir_archive_state = "SELECT state FROM mission WHERE mission_key = ?1";
 constexpr const char* k_one =
     "SELECT n_ranges, held, file, place, sha256_hex, file_bytes, n_cirs, n_moved, archived_t_ns FROM "
     "cir_archive WHERE mission_key = ?1";
@@ -23,7 +23,7 @@ constexpr const char* k_list =
     "a.n_moved, a.archived_t_ns FROM cir_archive a JOIN mission m ON m.mission_key = a.mission_key WHERE "
     "a.file <> '' AND m.mission_key NOT IN (SELECT mission_key FROM mission_bin) ORDER BY a.archived_t_ns "
     "DESC, m.mission_key DESC";
-constexpr const char* k_put =
+constexpr const char* k_cir_archive_put =
     "INSERT INTO cir_archive (mission_key, n_ranges, held, file, place, sha256_hex, file_bytes, n_cirs, "
     "n_moved, archived_t_ns) VALUES (?1, ?2, 0, ?3, ?4, ?5, ?6, ?7, 0, ?8) ON CONFLICT (mission_key) DO "
     "UPDATE SET n_ranges = excluded.n_ranges, held = 0, file = excluded.file, place = excluded.place, "
@@ -33,7 +33,8 @@ constexpr const char* k_gone_through = "UPDATE cir_archive SET n_ranges = ?2 WHE
 constexpr const char* k_hold = "UPDATE cir_archive SET held = 1 WHERE mission_key = ?1";
 constexpr const char* k_count_moved = "UPDATE cir_archive SET n_moved = n_moved + ?2 WHERE mission_key = ?1";
 constexpr const char* k_take_out = "DELETE FROM cir WHERE range_id = ?1";
-constexpr const char* k_take_back = "DELETE FROM cir_moved WHERE range_id = ?1 RETURNING range_id";
+constexpr const char* k_cir_archive_take_back =
+    "DELETE FROM cir_moved WHERE range_id = ?1 RETURNING range_id";
 constexpr BulkTable k_moved{"cir_moved", "range_id, digest"};
 
 /// No number of ranges: whoever looks finds that there is more to do.
@@ -182,7 +183,7 @@ class SqlCirArchive final : public CirArchive {
     BOOST_OUTCOME_TRYV(read_value<bool>(gate_, [&](Connection& c) -> Result<bool> {
       const auto key = mission_key(c, mission);
       if (!key) return absent("mission", mission);
-      Query query(c, k_state);
+      Query query(c, k_cir_archive_state);
       query << *key;
       if (query.step() && query.one_of(k_mission_state_words) == MissionState::finished) return true;
       return make_error(Errc::conflict, "mission " + to_string(mission) + " has not landed: finish it first");
@@ -257,7 +258,7 @@ class SqlCirArchive final : public CirArchive {
       std::vector<std::size_t> back;
       for (std::size_t i = from; i < until; ++i) {
         if (!page.rows[i].cir) continue;
-        Query query(c, k_take_back);
+        Query query(c, k_cir_archive_take_back);
         query << page.ids[i];
         if (query.returned()) back.push_back(i);
       }
@@ -280,7 +281,7 @@ class SqlCirArchive final : public CirArchive {
     return write_void(gate_, [&](Connection& c) -> std::optional<Error> {
       const auto key = mission_key(c, mission);
       if (!key) return absent("mission", mission);
-      Query query(c, k_put);
+      Query query(c, k_cir_archive_put);
       query << *key << n_ranges << entry.file << entry.place << entry.sha256_hex << entry.file_bytes
             << entry.n_cirs << entry.archived;
       query.run();

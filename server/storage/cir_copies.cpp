@@ -18,7 +18,7 @@ constexpr const char* k_needed =
     "SELECT m.id, a.file, a.sha256_hex, a.file_bytes FROM cir_archive a JOIN mission m ON m.mission_key = "
     "a.mission_key WHERE a.n_moved > 0 ORDER BY m.mission_key";
 constexpr int k_first_version = 18;  ///< of a database with the table
-constexpr const char *k_folder = "cir-archive", *k_digest = ".sha256", *k_part = ".part";
+constexpr const char *k_folder = "cir-archive", *k_digest = ".sha256", *k_copy_part = ".part";
 /// As a backup leaves it.
 constexpr std::uint64_t k_keep_free_bytes = 500ULL << 20;
 
@@ -73,7 +73,7 @@ Result<fs::path> copy_one(const fs::path& from, const NeededCirFile& needed, con
   std::error_code error;
   // Not by the name in the backup, which whoever made that wrote and which may lead out of the folder.
   const fs::path file = to.next(needed.mission);
-  const fs::path part = file.string() + k_part;
+  const fs::path part = file.string() + k_copy_part;
   auto done = write_bytes(from, part, way.go_on);
   if (done) done = sync_path(part);
   if (done) {

@@ -20,7 +20,7 @@ namespace fs = std::filesystem;
 
 constexpr const char *k_suffix = ".db", *k_part = ".part";
 /// Of pages of 4 KiB each would have one response, and a third of it empty.
-constexpr const char* k_schema = R"(
+constexpr const char* k_cir_file_schema = R"(
 PRAGMA page_size = 65536;
 PRAGMA journal_mode = OFF;
 PRAGMA synchronous = OFF;
@@ -39,13 +39,13 @@ CREATE TABLE cir (
 constexpr const char* k_index =
     "CREATE UNIQUE INDEX cir_identity ON cir (t_ns, tag, anchor, antenna, ifnull(seq, -1)); COMMIT;";
 constexpr const char* k_about = "INSERT INTO about VALUES ('mission', ?), ('format', 'docs/operations.md')";
-constexpr const char* k_insert =
+constexpr const char* k_cir_file_insert =
     "INSERT INTO cir (t_ns, tag, anchor, antenna, seq, dt_ps, first_path_idx, preamble_count, n_bytes, "
     "deflated) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?)";
-constexpr const char* k_find =
+constexpr const char* k_cir_file_find =
     "SELECT dt_ps, first_path_idx, preamble_count, n_bytes, deflated FROM cir WHERE t_ns = ? AND tag = ? AND "
     "anchor = ? AND antenna = ? AND ifnull(seq, -1) = ?";
-constexpr const char* k_all =
+constexpr const char* k_cir_file_all =
     "SELECT dt_ps, first_path_idx, preamble_count, n_bytes, deflated FROM cir ORDER BY number";
 
 /// What a device can have measured, many times over: a damaged length allocates no more.
@@ -112,7 +112,7 @@ std::optional<double> maybe_real(SQLite::Statement& query, int column) {
   return query.isColumnNull(column) ? std::nullopt : std::optional(query.getColumn(column).getDouble());
 }
 
-/// The columns of k_find and k_all.
+/// The columns of k_cir_file_find and k_cir_file_all.
 std::optional<Cir> read_cir(SQLite::Statement& query) {
   const auto blob = query.getColumn(4);
   const auto bytes = inflated(blob.getBlob(), blob.getBytes(), query.getColumn(3).getInt64());
@@ -146,20 +146,20 @@ std::map<std::uint64_t, fs::path, std::greater<>> numbered(const fs::path& dir, 
   return out;
 }
 
-class Writer final : public CirFileWriter {
+class CirRowsWriter final : public CirFileWriter {
  public:
-  Writer(fs::path file, const MissionId& mission)
+  CirRowsWriter(fs::path file, const MissionId& mission)
       : file_(std::move(file)),
         part_(file_.string() + k_part),
         db_(std::make_unique<SQLite::Database>(part_.string(),
                                                SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE)) {
-    db_->exec(k_schema);
+    db_->exec(k_cir_file_schema);
     SQLite::Statement about(*db_, k_about);
     about.bind(1, to_string(mission));
     about.exec();
-    insert_ = std::make_unique<SQLite::Statement>(*db_, k_insert);
+    insert_ = std::make_unique<SQLite::Statement>(*db_, k_cir_file_insert);
   }
-  ~Writer() override {
+  ~CirRowsWriter() override {
     insert_.reset();
     db_.reset();
     std::error_code ignored;
@@ -294,7 +294,7 @@ Result<std::unique_ptr<CirFileWriter>> CirFileWriter::create(const CirFolder& fo
   BOOST_OUTCOME_TRYV(sync_path(fs::absolute(folder.dir()).parent_path()));
   const fs::path file = folder.next(mission);
   try {
-    return std::unique_ptr<CirFileWriter>(std::make_unique<Writer>(file, mission));
+    return std::unique_ptr<CirFileWriter>(std::make_unique<CirRowsWriter>(file, mission));
   } catch (const SQLite::Exception& thrown) {
     return to_error(file, thrown);
   }
@@ -310,7 +310,7 @@ Result<void> check_cir_file(const fs::path& file, const std::vector<CirDigest>& 
   };
   try {
     const SQLite::Database db(file.string(), SQLite::OPEN_READONLY);
-    SQLite::Statement query(db, k_all);
+    SQLite::Statement query(db, k_cir_file_all);
     std::size_t n = 0;
     for (; query.executeStep(); ++n) {
       if (n % k_step == 0 && !go_on()) return make_error(Errc::canceled, "stopped");
@@ -327,7 +327,7 @@ Result<void> check_cir_file(const fs::path& file, const std::vector<CirDigest>& 
 class CirFinder::File {
  public:
   explicit File(const fs::path& file)
-      : db_(file.string(), SQLite::OPEN_READONLY | SQLite::OPEN_NOMUTEX), query_(db_, k_find) {}
+      : db_(file.string(), SQLite::OPEN_READONLY | SQLite::OPEN_NOMUTEX), query_(db_, k_cir_file_find) {}
   std::optional<Cir> find(const Range& range) {
     query_.reset();
     query_.bind(1, static_cast<std::int64_t>(range.time.ns));

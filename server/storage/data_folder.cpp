@@ -16,7 +16,7 @@
 namespace anchord::sql {
 namespace {
 
-constexpr const char* k_lock = "anchord.lock";
+constexpr const char* k_data_folder_lock = "anchord.lock";
 constexpr const char* k_marker = "anchord.folder";
 constexpr const char* k_reserve = "reserve.bin";
 constexpr const char* k_postgres = "anchord.postgresql";
@@ -81,9 +81,9 @@ Result<std::unique_ptr<DataFolder>> DataFolder::open(const std::filesystem::path
     ::chmod(dir.c_str(), k_private_folder);
     sync_names_above(dir);
   }
-  const auto path = dir / k_lock;
+  const auto path = dir / k_data_folder_lock;
   const int fd = open_file(path, O_RDWR | O_CREAT);
-  if (fd < 0) return system_error("data folder " + dir.string() + ": " + k_lock, errno);
+  if (fd < 0) return system_error("data folder " + dir.string() + ": " + k_data_folder_lock, errno);
   const int folder_fd = open_file(dir, O_RDONLY | O_DIRECTORY);
   // Where folders take no lock (some network file systems), that of the file is all there is.
   const bool in_use = ::flock(fd, LOCK_EX | LOCK_NB) != 0 ||

@@ -4,7 +4,7 @@
 namespace anchord::sql {
 namespace {
 
-constexpr const char* k_insert =
+constexpr const char* k_estimate_insert =
     "INSERT INTO estimate (calibration_key, network_id, ordinal, t_ns, verdict, reason, h95_m, v95_m, gdop, "
     "gdop_trace, "
     "n_used, bias_m, bias_sigma_m, lag_s, lag_sigma_s) "
@@ -16,7 +16,7 @@ constexpr const char* k_insert_hypothesis =
     "VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14, ?15, ?16, ?17)";
 constexpr const char* k_insert_refused =
     "INSERT INTO estimate_refused (calibration_key, network_id, reason, n_ranges) VALUES (?1, ?2, ?3, ?4)";
-constexpr const char* k_columns =
+constexpr const char* k_estimate_columns =
     "SELECT network_id, t_ns, verdict, reason, h95_m, v95_m, gdop, gdop_trace, n_used, bias_m, bias_sigma_m, "
     "lag_s, "
     "lag_sigma_s FROM estimate WHERE calibration_key = ?1 ";
@@ -77,7 +77,7 @@ void read_parts(Connection& c, std::int64_t key, Estimate& e) {
   }
 }
 
-Estimate read(Connection& c, std::int64_t key, Query& query) {
+Estimate read_estimate(Connection& c, std::int64_t key, Query& query) {
   Estimate e;
   e.anchor = query.network_id();
   e.time = query.time();
@@ -102,7 +102,7 @@ void store_estimates(Connection& connection, std::int64_t calibration_key,
                      const std::vector<Estimate>& estimates) {
   std::int64_t ordinal = 0;
   for (const Estimate& e : estimates) {
-    Query query(connection, k_insert);
+    Query query(connection, k_estimate_insert);
     query << calibration_key << e.anchor << ordinal++ << e.time << static_cast<int>(e.verdict) << e.reason
           << e.h95_m << e.v95_m << e.gdop << e.gdop_trace << std::uint64_t{e.n_used} << e.bias_m
           << e.bias_sigma_m << e.lag_s << e.lag_sigma_s;
@@ -125,19 +125,19 @@ void store_estimates(Connection& connection, std::int64_t calibration_key,
 }
 
 std::vector<Estimate> read_estimates(Connection& connection, std::int64_t calibration_key) {
-  Query query(connection, std::string(k_columns) + "ORDER BY ordinal");
+  Query query(connection, std::string(k_estimate_columns) + "ORDER BY ordinal");
   query << calibration_key;
   std::vector<Estimate> found;
-  while (query.step()) found.push_back(read(connection, calibration_key, query));
+  while (query.step()) found.push_back(read_estimate(connection, calibration_key, query));
   return found;
 }
 
 std::optional<Estimate> read_estimate(Connection& connection, std::int64_t calibration_key,
                                       NetworkId anchor) {
-  Query query(connection, std::string(k_columns) + "AND network_id = ?2");
+  Query query(connection, std::string(k_estimate_columns) + "AND network_id = ?2");
   query << calibration_key << anchor;
   if (!query.step()) return std::nullopt;
-  return read(connection, calibration_key, query);
+  return read_estimate(connection, calibration_key, query);
 }
 
 }  // namespace anchord::sql

@@ -20,7 +20,7 @@ constexpr int k_srs = 4979;
 
 // Tables of clause 1 and annex C of the standard. definition_12_063 is the extension gpkg_crs_wkt (annex
 // F.10): the older form of WKT knows no geographic system with heights.
-constexpr const char* k_schema = R"(
+constexpr const char* k_geopackage_schema = R"(
 PRAGMA application_id = 0x47504B47;
 PRAGMA user_version = 10300;
 CREATE TABLE gpkg_spatial_ref_sys (srs_name TEXT NOT NULL, srs_id INTEGER NOT NULL PRIMARY KEY,
@@ -223,7 +223,7 @@ class GeopackageFile final : public FeatureFile {
       : db_(path.string(), SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE),
         now_(milliseconds(to_rfc3339(now))) {
     db_.exec("PRAGMA journal_mode = OFF; PRAGMA synchronous = OFF; PRAGMA cache_size = -8000");
-    db_.exec(k_schema);
+    db_.exec(k_geopackage_schema);
     db_.exec("BEGIN");
     writer_.emplace(db_, head);
     for (const auto& row : head.rows) writer_->add(row);
@@ -263,7 +263,7 @@ class GeopackageFile final : public FeatureFile {
 Result<std::string> geopackage(std::span<const FeatureTable> tables, UtcTime now) {
   try {
     SQLite::Database db(":memory:", SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE);
-    db.exec(k_schema);
+    db.exec(k_geopackage_schema);
     db.exec("BEGIN");
     for (const auto& table : tables) add_table(db, table, milliseconds(to_rfc3339(now)));
     db.exec("COMMIT");

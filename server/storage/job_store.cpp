@@ -3,16 +3,16 @@
 namespace anchord::sql {
 namespace {
 
-constexpr const char* k_insert =
+constexpr const char* k_job_insert =
     "INSERT INTO job (id, kind, state, fraction, stage, detail, result_href, problem_json, request_json, "
     "created_t_ns, "
     "started_t_ns, finished_t_ns, worker, attempts) VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, "
     "?12, ?13, ?14)";
-constexpr const char* k_update =
+constexpr const char* k_job_update =
     "UPDATE job SET kind = ?2, state = ?3, fraction = ?4, stage = ?5, detail = ?6, result_href = ?7, "
     "problem_json = ?8, request_json = ?9, created_t_ns = ?10, started_t_ns = ?11, finished_t_ns = ?12, "
     "worker = ?13, attempts = ?14 WHERE id = ?1 RETURNING state";
-constexpr const char* k_columns =
+constexpr const char* k_job_columns =
     "SELECT id, kind, state, fraction, stage, detail, result_href, problem_json, request_json, created_t_ns, "
     "started_t_ns, finished_t_ns, worker, attempts FROM job ";
 constexpr const char* k_fail_unfinished =
@@ -25,7 +25,7 @@ void bind(Query& query, const Job& j) {
         << j.problem << j.request << j.created << j.started << j.finished << j.worker << j.attempts;
 }
 
-Job read(Query& query) {
+Job read_job(Query& query) {
   Job j;
   j.id = query.id<JobId>();
   j.kind = query.text();
@@ -50,7 +50,7 @@ class SqlJobStore final : public JobStore {
 
   Result<void> insert(const Job& job) override {
     return write_void(gate_, [&](Connection& c) -> std::optional<Error> {
-      Query query(c, k_insert);
+      Query query(c, k_job_insert);
       bind(query, job);
       query.run();
       return std::nullopt;
@@ -58,7 +58,7 @@ class SqlJobStore final : public JobStore {
   }
   Result<void> update(const Job& job) override {
     return write_void(gate_, [&](Connection& c) -> std::optional<Error> {
-      Query query(c, k_update);
+      Query query(c, k_job_update);
       bind(query, job);
       if (query.returned()) return std::nullopt;
       return make_error(Errc::not_found, "no job " + to_string(job.id));
@@ -66,20 +66,20 @@ class SqlJobStore final : public JobStore {
   }
   Result<Job> job(const JobId& id) override {
     return read_value<Job>(gate_, [&](Connection& c) -> Result<Job> {
-      Query query(c, std::string(k_columns) + "WHERE id = ?1");
+      Query query(c, std::string(k_job_columns) + "WHERE id = ?1");
       query << id;
       if (!query.step()) return make_error(Errc::not_found, "no job " + to_string(id));
-      return read(query);
+      return read_job(query);
     });
   }
   Result<std::vector<Job>> jobs(std::size_t limit, const std::optional<JobId>& after) override {
     return read_value<std::vector<Job>>(gate_, [&](Connection& c) -> Result<std::vector<Job>> {
-      Query query(c, std::string(k_columns) +
+      Query query(c, std::string(k_job_columns) +
                          (after ? "WHERE id < ?1 ORDER BY id DESC LIMIT ?2" : "ORDER BY id DESC LIMIT ?1"));
       if (after) query << *after;
       query << row_limit(limit);
       std::vector<Job> found;
-      while (query.step()) found.push_back(read(query));
+      while (query.step()) found.push_back(read_job(query));
       return found;
     });
   }

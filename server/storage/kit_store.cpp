@@ -3,17 +3,17 @@
 namespace anchord::sql {
 namespace {
 
-constexpr const char* k_columns =
+constexpr const char* k_kit_columns =
     "SELECT kit, version, t_ns, changed_by, source, profile_json FROM kit_profile ";
 constexpr const char* k_newest_of = "WHERE kit = ?1 ORDER BY version DESC LIMIT ?2";
 constexpr const char* k_newest_of_all =
     "AS p WHERE version = (SELECT max(version) FROM kit_profile WHERE kit = p.kit) ORDER BY kit";
 constexpr const char* k_version = "SELECT coalesce(max(version), 0) FROM kit_profile WHERE kit = ?1";
-constexpr const char* k_insert =
+constexpr const char* k_kit_insert =
     "INSERT INTO kit_profile (kit, version, t_ns, changed_by, source, profile_json) VALUES (?1, ?2, ?3, ?4, "
     "?5, ?6)";
 
-StoredProfile read(Query& query) {
+StoredProfile read_kit(Query& query) {
   StoredProfile p;
   p.kit = query.text();
   p.version = query.as<std::uint64_t>();
@@ -24,9 +24,9 @@ StoredProfile read(Query& query) {
   return p;
 }
 
-std::vector<StoredProfile> all(Query& query) {
+std::vector<StoredProfile> all_profiles(Query& query) {
   std::vector<StoredProfile> found;
-  while (query.step()) found.push_back(read(query));
+  while (query.step()) found.push_back(read_kit(query));
   return found;
 }
 
@@ -48,7 +48,7 @@ class SqlKitStore final : public KitStore {
         return moved_on("the profile of kit " + profile.kit, expected_version, stored);
       StoredProfile kept = profile;
       kept.version = stored + 1;
-      Query insert(c, k_insert);
+      Query insert(c, k_kit_insert);
       insert << kept.kit << kept.version << kept.time << kept.by << kept.source << kept.profile;
       insert.run();
       return kept;
@@ -57,17 +57,17 @@ class SqlKitStore final : public KitStore {
   Result<std::vector<StoredProfile>> history(const std::string& kit, std::size_t limit) override {
     return read_value<std::vector<StoredProfile>>(gate_,
                                                   [&](Connection& c) -> Result<std::vector<StoredProfile>> {
-                                                    Query query(c, std::string(k_columns) + k_newest_of);
+                                                    Query query(c, std::string(k_kit_columns) + k_newest_of);
                                                     query << kit << row_limit(limit);
-                                                    return all(query);
+                                                    return all_profiles(query);
                                                   });
   }
   Result<std::vector<StoredProfile>> newest() override {
-    return read_value<std::vector<StoredProfile>>(gate_,
-                                                  [&](Connection& c) -> Result<std::vector<StoredProfile>> {
-                                                    Query query(c, std::string(k_columns) + k_newest_of_all);
-                                                    return all(query);
-                                                  });
+    return read_value<std::vector<StoredProfile>>(
+        gate_, [&](Connection& c) -> Result<std::vector<StoredProfile>> {
+          Query query(c, std::string(k_kit_columns) + k_newest_of_all);
+          return all_profiles(query);
+        });
   }
 
  private:

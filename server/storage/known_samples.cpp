@@ -10,12 +10,13 @@
 namespace anchord::sql {
 namespace {
 
-const std::string k_columns =
+const std::string k_known_samples_columns =
     "SELECT sample_id, t_ns, seq, range_m, rx_dbm, fp_dbm, fp_amp1, fp_amp2, fp_amp3, cir_power, "
     "preamble_count, std_noise, max_noise, fp_index, EXISTS (SELECT 1 FROM campaign_cir c WHERE c.sample_id "
     "= "
     "campaign_sample.sample_id) FROM campaign_sample WHERE setting_key = ?1 AND t_ns ";
-const std::string k_timed = k_columns + ">= ?2 AND t_ns <= ?3", k_untimed = k_columns + "IS NULL";
+const std::string k_timed = k_known_samples_columns + ">= ?2 AND t_ns <= ?3",
+                  k_untimed = k_known_samples_columns + "IS NULL";
 constexpr const char* k_cir =
     "SELECT dt_ps, first_path_idx, preamble_count, re_im FROM campaign_cir WHERE "
     "sample_id = ?1";

@@ -10,7 +10,7 @@ namespace {
 static_assert(std::endian::native == std::endian::little, "impulse responses are stored little endian");
 
 /// One statement for either, which in PostgreSQL is a round trip less.
-constexpr const char* k_select_cir =
+constexpr const char* k_measurement_select_cir =
     "SELECT 0 AS moved, dt_ps, first_path_idx, preamble_count, re_im FROM cir WHERE range_id = ?1 UNION ALL "
     "SELECT 1, 0, NULL, NULL, digest FROM cir_moved WHERE range_id = ?1";
 
@@ -157,7 +157,7 @@ void bind_cir(Query& query, std::int64_t range_id, const Cir& cir) {
 }
 
 StoredCir read_cir(Connection& connection, std::int64_t range_id) {
-  Query query(connection, k_select_cir);
+  Query query(connection, k_measurement_select_cir);
   query << range_id;
   if (!query.step()) return {};
   if (query.integer() == 0) return {read_cir_columns(query), std::nullopt};

@@ -21,12 +21,12 @@ constexpr const char* k_devices =
     "d.network_id";
 /// Each row was noted with its two radios, in its own transaction: what a count over the rows gives, without
 /// them.
-constexpr const char* k_count_ranges =
+constexpr const char* k_measurement_count_ranges =
     "SELECT CAST(coalesce(sum(n_ranges), 0) AS BIGINT) / 2 FROM device_seen WHERE mission_key = ?1";
 constexpr const char* k_count_all_ranges =
     "SELECT CAST(coalesce(sum(n_ranges), 0) AS BIGINT) / 2 FROM device_seen WHERE mission_key NOT IN (SELECT "
     "mission_key FROM mission_bin)";
-constexpr const char* k_count_fixes = "SELECT n_fixes FROM mission_fixes WHERE mission_key = ?1";
+constexpr const char* k_measurement_count_fixes = "SELECT n_fixes FROM mission_fixes WHERE mission_key = ?1";
 
 class Keys {
  public:
@@ -361,7 +361,7 @@ class SqlMeasurementStore final : public MeasurementStore {
     });
   }
   Result<std::uint64_t> count_ranges(const MissionId& mission) override {
-    return count(mission, k_count_ranges);
+    return count(mission, k_measurement_count_ranges);
   }
   Result<std::uint64_t> count_ranges(const Filter& all) override {
     Filter filter = all;
@@ -370,7 +370,7 @@ class SqlMeasurementStore final : public MeasurementStore {
       const auto key = filter.mission ? mission_key(c, *filter.mission) : std::nullopt;
       if (filter.mission && !key) return gone(*filter.mission);
       if (unfiltered(filter)) {
-        Query query(c, key ? k_count_ranges : k_count_all_ranges);
+        Query query(c, key ? k_measurement_count_ranges : k_count_all_ranges);
         if (key) query << *key;
         return query.step() ? query.as<std::uint64_t>() : 0;
       }
@@ -381,7 +381,7 @@ class SqlMeasurementStore final : public MeasurementStore {
     });
   }
   Result<std::uint64_t> count_fixes(const MissionId& mission) override {
-    return count(mission, k_count_fixes);
+    return count(mission, k_measurement_count_fixes);
   }
 
   Result<std::vector<DeviceSeen>> devices(const std::optional<MissionId>& mission) override {

@@ -9,8 +9,9 @@
 namespace anchord::sql {
 namespace {
 
-constexpr const char* k_applied = "SELECT number, name, sha256_hex FROM schema_migration ORDER BY number";
-constexpr const char* k_record =
+constexpr const char* k_migrate_applied =
+    "SELECT number, name, sha256_hex FROM schema_migration ORDER BY number";
+constexpr const char* k_migrate_record =
     "INSERT INTO schema_migration (number, name, sha256_hex, applied_t_ns) VALUES (?1, ?2, ?3, ?4)";
 
 std::string quoted(std::string text) {
@@ -35,7 +36,7 @@ Result<void> copy_before(SqliteConnection& connection, const std::filesystem::pa
 }
 
 Result<void> verify_applied(SqliteConnection& connection, std::span<const Migration> migrations) {
-  Query query(connection, k_applied);
+  Query query(connection, k_migrate_applied);
   while (query.step()) {
     const auto number = query.integer();
     const auto name = query.text();
@@ -56,7 +57,7 @@ void apply(SqliteConnection& connection, const Migration& migration, UtcTime now
   try {
     connection.execute(std::string(migration.sql));
     {
-      Query query(connection, k_record);
+      Query query(connection, k_migrate_record);
       query << migration.number << migration.name << sha256_hex(migration.sql) << now;
       query.run();
     }

@@ -6,14 +6,14 @@
 namespace anchord::sql {
 namespace {
 
-constexpr const char* k_state =
+constexpr const char* k_mission_bin_state =
     "SELECT mission_key, state FROM mission WHERE id = ?1 AND mission_key NOT IN "
     "(SELECT mission_key FROM mission_bin)";
 constexpr const char* k_calibrations = "SELECT count(*) FROM calibration_mission WHERE mission_key = ?1";
-constexpr const char* k_put =
+constexpr const char* k_mission_bin_put =
     "INSERT INTO mission_bin (mission_key, deleted_t_ns, deleted_ran_ns, deleted_by, emptying) "
     "VALUES (?1, ?2, ?3, ?4, 0)";
-constexpr const char* k_find =
+constexpr const char* k_mission_bin_find =
     "SELECT b.mission_key, b.emptying FROM mission_bin b JOIN mission m ON m.mission_key = b.mission_key "
     "WHERE m.id = ?1";
 constexpr const char* k_restore = "DELETE FROM mission_bin WHERE mission_key = ?1";
@@ -24,13 +24,13 @@ constexpr const char* k_emptying =
     "SELECT b.mission_key, m.id FROM mission_bin b JOIN mission m ON m.mission_key = b.mission_key WHERE "
     "b.emptying = 1 ORDER BY b.mission_key LIMIT 1";
 // Children first and few at a time; the impulse responses go with their ranges.
-constexpr std::array k_rows{
+constexpr std::array k_mission_bin_rows{
     "DELETE FROM uwb_range WHERE range_id IN (SELECT range_id FROM uwb_range WHERE mission_key = ?1 LIMIT "
     "?2) "
     "RETURNING range_id",
     "DELETE FROM fix WHERE fix_id IN (SELECT fix_id FROM fix WHERE mission_key = ?1 LIMIT ?2) RETURNING "
     "fix_id"};
-constexpr const char* k_remove = "DELETE FROM mission WHERE mission_key = ?1";
+constexpr const char* k_mission_bin_remove = "DELETE FROM mission WHERE mission_key = ?1";
 
 constexpr const char* k_running = "SELECT running_ns FROM service_state WHERE one = 1";
 constexpr const char* k_keep_running =
@@ -51,7 +51,7 @@ class SqlMissionBin final : public MissionBin {
 
   Result<void> put(const MissionId& id, UtcTime now, std::int64_t ran_ns, std::string_view by) override {
     return write_void(gate_, [&](Connection& c) -> std::optional<Error> {
-      Query found(c, k_state);
+      Query found(c, k_mission_bin_state);
       found << id;
       if (!found.step()) return make_error(Errc::not_found, "no mission " + to_string(id));
       const std::int64_t key = found.integer();
@@ -66,7 +66,7 @@ class SqlMissionBin final : public MissionBin {
                               (n == 1 ? " calibration" : " calibrations") +
                               ", whose positions are based on its measurements: delete those first");
       }
-      Query query(c, k_put);
+      Query query(c, k_mission_bin_put);
       query << key << now << ran_ns << by;
       query.run();
       return std::nullopt;
@@ -112,14 +112,14 @@ class SqlMissionBin final : public MissionBin {
       const std::int64_t key = next.integer();
       const auto id = next.id<MissionId>();
       std::size_t n = 0;
-      for (const char* text : k_rows) {
+      for (const char* text : k_mission_bin_rows) {
         if (n >= most) return n;
         Query query(c, text);
         query << key << row_limit(most - n);
         while (query.step()) ++n;
       }
       if (n >= most) return n;
-      Query remove(c, k_remove);
+      Query remove(c, k_mission_bin_remove);
       remove << key;
       remove.run();
       gone = id;
@@ -132,7 +132,7 @@ class SqlMissionBin final : public MissionBin {
  private:
   static std::optional<Error> change(Connection& c, const MissionId& id, const char* text,
                                      bool also_while_emptying) {
-    Query found(c, k_find);
+    Query found(c, k_mission_bin_find);
     found << id;
     if (!found.step()) return not_binned(id);
     const std::int64_t key = found.integer();

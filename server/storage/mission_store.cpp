@@ -9,21 +9,21 @@ namespace {
 
 // What is in the bin exists for the bin alone (mission_bin_store.cpp).
 constexpr const char* k_not_binned = "mission_key NOT IN (SELECT mission_key FROM mission_bin)";
-constexpr const char* k_key =
+constexpr const char* k_mission_key =
     "SELECT mission_key FROM mission WHERE id = ?1 AND mission_key NOT IN (SELECT mission_key FROM "
     "mission_bin)";
 constexpr const char* k_id_taken = "SELECT count(*) FROM mission WHERE id = ?1";
-constexpr const char* k_insert =
+constexpr const char* k_mission_insert =
     "INSERT INTO mission (id, site_id, name, kit, radio, frame, track_point, state, created_t_ns, "
     "finished_t_ns, lever_arm_sigma_m) "
     "VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11) RETURNING mission_key";
-constexpr const char* k_update =
+constexpr const char* k_mission_update =
     "UPDATE mission SET site_id = ?2, name = ?3, kit = ?4, radio = ?5, frame = ?6, track_point = ?7, state = "
     "?8, "
     "created_t_ns = ?9, finished_t_ns = ?10, lever_arm_sigma_m = ?11 WHERE id = ?1 RETURNING mission_key";
-constexpr const char* k_finish =
+constexpr const char* k_mission_finish =
     "UPDATE mission SET state = ?3, finished_t_ns = ?2 WHERE id = ?1 AND state <> ?3 RETURNING mission_key";
-constexpr const char* k_columns =
+constexpr const char* k_mission_columns =
     "SELECT mission_key, id, site_id, name, kit, radio, frame, track_point, state, created_t_ns, "
     "finished_t_ns, lever_arm_sigma_m "
     "FROM mission ";
@@ -81,7 +81,7 @@ void bind(Query& query, const Mission& m) {
         << m.lever_arm_sigma_m;
 }
 
-Mission read(Connection& connection, Query& query) {
+Mission read_mission(Connection& connection, Query& query) {
   Mission m;
   const std::int64_t key = query.integer();
   m.id = query.id<MissionId>();
@@ -108,11 +108,11 @@ Mission read(Connection& connection, Query& query) {
 }
 
 Result<Mission> find(Connection& c, const MissionId& id) {
-  static const std::string text = std::string(k_columns) + "WHERE id = ?1 AND " + k_not_binned;
+  static const std::string text = std::string(k_mission_columns) + "WHERE id = ?1 AND " + k_not_binned;
   Query query(c, text);
   query << id;
   if (!query.step()) return no_mission(id);
-  return read(c, query);
+  return read_mission(c, query);
 }
 
 class SqlMissionStore final : public MissionStore {
@@ -129,7 +129,7 @@ class SqlMissionStore final : public MissionStore {
       if (auto error = check_site(c, mission)) return error;
       // It will measure: of those there must be room for one at least.
       if (auto error = beyond_quota(c, mission.site, {1, 1, 0})) return error;
-      Query query(c, k_insert);
+      Query query(c, k_mission_insert);
       bind(query, mission);
       store_tags(c, query.returned().value(), mission);
       return std::nullopt;
@@ -144,7 +144,7 @@ class SqlMissionStore final : public MissionStore {
       if (const auto from = site_of(c, *stored); from != mission.site)
         if (auto error = beyond_quota(c, mission.site, {1, count_measurements(c, *stored), 0}, from))
           return error;
-      Query query(c, k_update);
+      Query query(c, k_mission_update);
       bind(query, mission);
       const auto key = query.returned();
       if (!key) return no_mission(mission.id);
@@ -158,7 +158,7 @@ class SqlMissionStore final : public MissionStore {
 
   Result<Mission> finish(const MissionId& id, UtcTime now) override {
     return write_value<Mission>(gate_, 1, [&](Connection& c) -> Result<Mission> {
-      Query query(c, k_finish);
+      Query query(c, k_mission_finish);
       query << id << now << static_cast<int>(MissionState::finished);
       const bool done = query.returned().has_value();
       auto mission = find(c, id);
@@ -175,15 +175,15 @@ class SqlMissionStore final : public MissionStore {
     return read_value<std::vector<Mission>>(gate_, [&](Connection& c) -> Result<std::vector<Mission>> {
       // By the database's own numbers: an id has the time of a clock in it that somebody may have set back.
       static const std::string first =
-          std::string(k_columns) + "WHERE " + k_not_binned + " ORDER BY mission_key DESC LIMIT ?1";
-      static const std::string next = std::string(k_columns) + "WHERE " + k_not_binned +
+          std::string(k_mission_columns) + "WHERE " + k_not_binned + " ORDER BY mission_key DESC LIMIT ?1";
+      static const std::string next = std::string(k_mission_columns) + "WHERE " + k_not_binned +
                                       " AND mission_key < (SELECT mission_key FROM mission WHERE id = ?1) "
                                       "ORDER BY mission_key DESC LIMIT ?2";
       Query query(c, after ? next : first);
       if (after) query << *after;
       query << row_limit(limit);
       std::vector<Mission> found;
-      while (query.step()) found.push_back(read(c, query));
+      while (query.step()) found.push_back(read_mission(c, query));
       return found;
     });
   }
@@ -200,13 +200,13 @@ std::unique_ptr<MissionStore> make_mission_store(Gate& gate, AdmitMission admit)
 }
 
 std::optional<std::int64_t> mission_key(Connection& connection, const MissionId& id) {
-  Query query(connection, k_key);
+  Query query(connection, k_mission_key);
   query << id;
   return query.step() ? std::optional(query.integer()) : std::nullopt;
 }
 
 std::vector<BinnedMission> read_binned_missions(Connection& connection) {
-  static const std::string text = std::string(k_columns) + "WHERE id = ?1";
+  static const std::string text = std::string(k_mission_columns) + "WHERE id = ?1";
   std::vector<BinnedMission> found;
   Query query(connection, k_binned);
   while (query.step()) {
@@ -219,7 +219,7 @@ std::vector<BinnedMission> read_binned_missions(Connection& connection) {
     one.n_fixes = query.as<std::uint64_t>();
     Query mission(connection, text);
     mission << query.id<MissionId>();
-    if (mission.step()) one.mission = read(connection, mission);
+    if (mission.step()) one.mission = read_mission(connection, mission);
     found.push_back(std::move(one));
   }
   return found;

@@ -4,12 +4,12 @@
 namespace anchord::sql {
 namespace {
 
-constexpr const char* k_insert =
+constexpr const char* k_model_insert =
     "INSERT INTO model (id, run_key, task, method, sha256_hex, manifest_json, created_t_ns, created_by, "
     "signature) VALUES (?1, (SELECT run_key FROM training_run WHERE id = ?2), ?3, ?4, ?5, ?6, ?7, ?8, ?9) "
     "RETURNING model_key";
 constexpr const char* k_insert_artifact = "INSERT INTO model_artifact (model_key, json) VALUES (?1, ?2)";
-constexpr const char* k_columns =
+constexpr const char* k_model_columns =
     "SELECT m.id, r.id, m.task, m.method, m.sha256_hex, m.manifest_json, m.created_t_ns, m.created_by, "
     "m.signature FROM "
     "model m LEFT JOIN training_run r ON r.run_key = m.run_key ";
@@ -18,18 +18,18 @@ constexpr const char* k_artifact =
 constexpr const char* k_sign = "UPDATE model SET signature = ?2 WHERE id = ?1 RETURNING model_key";
 constexpr const char* k_promoted =
     "SELECT count(*) FROM model_promotion p JOIN model m ON m.model_key = p.model_key WHERE m.id = ?1";
-constexpr const char* k_remove = "DELETE FROM model WHERE id = ?1 RETURNING model_key";
+constexpr const char* k_model_remove = "DELETE FROM model WHERE id = ?1 RETURNING model_key";
 constexpr const char* k_promote =
     "INSERT INTO model_promotion (task, model_key, t_ns, promoted_by, reason, is_rollback) VALUES (?1, "
     "(SELECT model_key FROM model WHERE id = ?2), ?3, ?4, ?5, ?6) RETURNING number";
-constexpr const char* k_newest = "SELECT coalesce(max(number), 0) FROM model_promotion";
+constexpr const char* k_model_newest = "SELECT coalesce(max(number), 0) FROM model_promotion";
 constexpr const char* k_promotions =
     "SELECT p.number, p.task, m.id, p.t_ns, p.promoted_by, p.reason, p.is_rollback FROM model_promotion p "
     "LEFT JOIN model m ON m.model_key = p.model_key ";
 
 Error no_model(const ModelId& id) { return make_error(Errc::not_found, "no model " + to_string(id)); }
 
-StoredModel read(Query& query) {
+StoredModel read_model(Query& query) {
   StoredModel m;
   m.id = query.id<ModelId>();
   m.run = query.maybe([&] { return query.id<TrainingRunId>(); });
@@ -68,22 +68,22 @@ class SqlModelStore final : public ModelStore {
 
   Result<StoredModel> model(const ModelId& id) override {
     return read_value<StoredModel>(gate_, [&](Connection& c) -> Result<StoredModel> {
-      Query query(c, std::string(k_columns) + "WHERE m.id = ?1");
+      Query query(c, std::string(k_model_columns) + "WHERE m.id = ?1");
       query << id;
       if (!query.step()) return no_model(id);
-      return read(query);
+      return read_model(query);
     });
   }
 
   Result<std::vector<StoredModel>> models(std::size_t limit, const std::optional<ModelId>& after) override {
     return read_value<std::vector<StoredModel>>(
         gate_, [&](Connection& c) -> Result<std::vector<StoredModel>> {
-          Query query(c, std::string(k_columns) + (after ? "WHERE m.id < ?1 ORDER BY m.id DESC LIMIT ?2"
-                                                         : "ORDER BY m.id DESC LIMIT ?1"));
+          Query query(c, std::string(k_model_columns) + (after ? "WHERE m.id < ?1 ORDER BY m.id DESC LIMIT ?2"
+                                                               : "ORDER BY m.id DESC LIMIT ?1"));
           if (after) query << *after;
           query << row_limit(limit);
           std::vector<StoredModel> found;
-          while (query.step()) found.push_back(read(query));
+          while (query.step()) found.push_back(read_model(query));
           return found;
         });
   }
@@ -113,7 +113,7 @@ class SqlModelStore final : public ModelStore {
       if (promoted.step() && promoted.integer() > 0)
         return make_error(Errc::conflict,
                           "model " + to_string(id) + " has been promoted and cannot be deleted");
-      Query query(c, k_remove);
+      Query query(c, k_model_remove);
       query << id;
       if (query.returned()) return std::nullopt;
       return no_model(id);
@@ -122,7 +122,7 @@ class SqlModelStore final : public ModelStore {
 
   Result<Promotion> promote(const Promotion& promotion, std::optional<std::uint64_t> decided_on) override {
     return write_value<Promotion>(gate_, 1, [&](Connection& c) -> Result<Promotion> {
-      Query newest(c, k_newest);
+      Query newest(c, k_model_newest);
       const std::uint64_t before = newest.step() ? newest.as<std::uint64_t>() : 0;
       if (decided_on && *decided_on != before)
         return make_error(Errc::conflict, "promotion " + std::to_string(before) +
@@ -177,7 +177,7 @@ class SqlModelStore final : public ModelStore {
 }  // namespace
 
 void insert_model(Connection& connection, const StoredModel& m, std::string_view artifact) {
-  Query query(connection, k_insert);
+  Query query(connection, k_model_insert);
   query << m.id << m.run << m.task << m.method << m.sha256_hex << m.manifest << m.created << m.created_by
         << m.signature;
   const auto key = query.returned();

@@ -4,17 +4,19 @@
 namespace anchord::sql {
 namespace {
 
-constexpr const char* k_insert =
+constexpr const char* k_organization_insert =
     "INSERT INTO organization (id, name, description, created_t_ns, version) VALUES (?1, ?2, ?3, ?4, ?5) ON "
     "CONFLICT DO NOTHING RETURNING version";
-constexpr const char* k_update =
+constexpr const char* k_organization_update =
     "UPDATE organization SET name = ?2, description = ?3, version = ?4 WHERE id = ?1 AND version = ?5 "
     "RETURNING version";
-constexpr const char* k_columns = "SELECT id, name, description, created_t_ns, version FROM organization ";
-constexpr const char* k_sites = "SELECT count(*) FROM site WHERE organization_id = ?1";
+constexpr const char* k_organization_columns =
+    "SELECT id, name, description, created_t_ns, version FROM organization ";
+constexpr const char* k_organization_sites = "SELECT count(*) FROM site WHERE organization_id = ?1";
 constexpr const char* k_tokens =
     "SELECT count(*) FROM token WHERE organization_id = ?1 AND revoked_t_ns IS NULL";
-constexpr const char* k_remove = "DELETE FROM organization WHERE id = ?1 AND version = ?2 RETURNING version";
+constexpr const char* k_organization_remove =
+    "DELETE FROM organization WHERE id = ?1 AND version = ?2 RETURNING version";
 constexpr const char* k_members =
     "SELECT organization_id, id FROM site WHERE organization_id IS NOT NULL ORDER BY organization_id, id";
 
@@ -29,7 +31,7 @@ Organization read_organization(Query& query) {
 }
 
 std::optional<Organization> find_organization(Connection& c, const OrganizationId& id) {
-  Query query(c, std::string(k_columns) + "WHERE id = ?1");
+  Query query(c, std::string(k_organization_columns) + "WHERE id = ?1");
   query << id;
   if (!query.step()) return std::nullopt;
   return read_organization(query);
@@ -47,7 +49,7 @@ class SqlOrganizationStore final : public OrganizationStore {
 
   Result<void> insert(const Organization& organization) override {
     return write_void(gate_, [&](Connection& c) -> std::optional<Error> {
-      Query query(c, k_insert);
+      Query query(c, k_organization_insert);
       query << organization.id << organization.name << organization.description << organization.created
             << organization.version;
       if (query.returned()) return std::nullopt;
@@ -56,7 +58,7 @@ class SqlOrganizationStore final : public OrganizationStore {
   }
   Result<void> update(const Organization& organization, std::uint64_t expected_version) override {
     return write_void(gate_, [&](Connection& c) -> std::optional<Error> {
-      Query query(c, k_update);
+      Query query(c, k_organization_update);
       query << organization.id << organization.name << organization.description << expected_version + 1
             << expected_version;
       if (query.returned()) return std::nullopt;
@@ -74,7 +76,7 @@ class SqlOrganizationStore final : public OrganizationStore {
                                                   const std::optional<OrganizationId>& after) override {
     return read_value<std::vector<Organization>>(
         gate_, [&](Connection& c) -> Result<std::vector<Organization>> {
-          Query query(c, std::string(k_columns) + "WHERE id > ?1 ORDER BY id LIMIT ?2");
+          Query query(c, std::string(k_organization_columns) + "WHERE id > ?1 ORDER BY id LIMIT ?2");
           query << after.value_or(OrganizationId{}) << row_limit(limit);
           std::vector<Organization> found;
           while (query.step()) found.push_back(read_organization(query));
@@ -83,14 +85,14 @@ class SqlOrganizationStore final : public OrganizationStore {
   }
   Result<void> remove(const OrganizationId& id, std::uint64_t expected_version) override {
     return write_void(gate_, [&](Connection& c) -> std::optional<Error> {
-      const auto sites = count(c, k_sites, id), tokens = count(c, k_tokens, id);
+      const auto sites = count(c, k_organization_sites, id), tokens = count(c, k_tokens, id);
       if (sites > 0 || tokens > 0)
         return make_error(Errc::conflict,
                           "organization " + to_string(id) + " has " + std::to_string(sites) + " sites and " +
                               std::to_string(tokens) +
                               " tokens: delete its sites or give them to another organization (PATCH "
                               "/api/v1/sites/ID), and revoke its tokens");
-      Query query(c, k_remove);
+      Query query(c, k_organization_remove);
       query << id << expected_version;
       if (query.returned()) return std::nullopt;
       return changed_or_absent(c, id, expected_version);

@@ -46,7 +46,8 @@ constexpr const char* k_part_insert =
     "INSERT INTO plan_image_part (image_id, ordinal, content) SELECT id, ?2, ?3 FROM plan_image WHERE id = "
     "?1 "
     "RETURNING ordinal";
-constexpr const char* k_part = "SELECT content FROM plan_image_part WHERE image_id = ?1 AND ordinal = ?2";
+constexpr const char* k_place_part =
+    "SELECT content FROM plan_image_part WHERE image_id = ?1 AND ordinal = ?2";
 constexpr const char* k_image_size = "SELECT bytes FROM plan_image WHERE id = ?1";
 
 /// Rows and bytes of tiles that one transaction writes, and rows that one deletes.
@@ -342,7 +343,7 @@ class SqlPlaceStore final : public PlaceStore {
       if (!size.step()) return absent("picture", image);
       std::string out;
       out.reserve(static_cast<std::size_t>(size.integer()));
-      Query query(c, k_part);
+      Query query(c, k_place_part);
       for (std::int64_t ordinal = 0;; ++ordinal) {
         query.again();
         query << image << ordinal;

@@ -3,22 +3,22 @@
 namespace anchord::sql {
 namespace {
 
-constexpr const char* k_insert =
+constexpr const char* k_plan_insert =
     "INSERT INTO plan (id, name, site_id, document_json, created_t_ns, changed_t_ns, version) "
     "VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7) ON CONFLICT DO NOTHING RETURNING version";
-constexpr const char* k_update =
+constexpr const char* k_plan_update =
     "UPDATE plan SET name = ?2, site_id = ?3, document_json = ?4, created_t_ns = ?5, changed_t_ns = ?6, "
     "version = ?7 WHERE id = ?1 AND version = ?8 RETURNING version";
-constexpr const char* k_columns =
+constexpr const char* k_plan_columns =
     "SELECT id, name, site_id, document_json, created_t_ns, changed_t_ns, version FROM plan ";
-constexpr const char* k_remove = "DELETE FROM plan WHERE id = ?1 AND version = ?2 RETURNING version";
+constexpr const char* k_plan_remove = "DELETE FROM plan WHERE id = ?1 AND version = ?2 RETURNING version";
 constexpr const char* k_exists = "SELECT version FROM plan WHERE id = ?1";
-constexpr const char* k_keep =
+constexpr const char* k_plan_keep =
     "INSERT INTO mission_procedure (mission_key, state_json, changed_t_ns) VALUES (?1, ?2, ?3) "
     "ON CONFLICT (mission_key) DO UPDATE SET state_json = excluded.state_json, "
     "changed_t_ns = excluded.changed_t_ns";
-constexpr const char* k_forget = "DELETE FROM mission_procedure WHERE mission_key = ?1";
-constexpr const char* k_procedure =
+constexpr const char* k_plan_forget = "DELETE FROM mission_procedure WHERE mission_key = ?1";
+constexpr const char* k_plan_procedure =
     "SELECT p.state_json FROM mission_procedure p JOIN mission m ON m.mission_key = p.mission_key "
     "WHERE m.id = ?1";
 constexpr const char* k_procedures =
@@ -37,7 +37,7 @@ void bind(Query& query, const StoredPlan& p, std::uint64_t version) {
   query << p.id << p.name << p.site << p.document << p.created << p.changed << version;
 }
 
-StoredPlan read(Query& query) {
+StoredPlan read_plan(Query& query) {
   StoredPlan p;
   p.id = query.id<PlanId>();
   p.name = query.text();
@@ -56,7 +56,7 @@ class SqlPlanStore final : public PlanStore {
   Result<void> insert(const StoredPlan& plan) override {
     return write_void(gate_, [&](Connection& c) -> std::optional<Error> {
       if (auto error = missing_site(c, plan.site)) return error;
-      Query query(c, k_insert);
+      Query query(c, k_plan_insert);
       bind(query, plan, plan.version);
       if (query.returned()) return std::nullopt;
       return make_error(Errc::conflict, "plan " + to_string(plan.id) + " exists");
@@ -66,7 +66,7 @@ class SqlPlanStore final : public PlanStore {
   Result<void> update(const StoredPlan& plan, std::uint64_t expected_version) override {
     return write_void(gate_, [&](Connection& c) -> std::optional<Error> {
       if (auto error = missing_site(c, plan.site)) return error;
-      Query query(c, k_update);
+      Query query(c, k_plan_update);
       bind(query, plan, expected_version + 1);
       query << expected_version;
       if (query.returned()) return std::nullopt;
@@ -76,30 +76,30 @@ class SqlPlanStore final : public PlanStore {
 
   Result<StoredPlan> plan(const PlanId& id) override {
     return read_value<StoredPlan>(gate_, [&](Connection& c) -> Result<StoredPlan> {
-      static const std::string text = std::string(k_columns) + "WHERE id = ?1";
+      static const std::string text = std::string(k_plan_columns) + "WHERE id = ?1";
       Query query(c, text);
       query << id;
       if (!query.step()) return absent("plan", id);
-      return read(query);
+      return read_plan(query);
     });
   }
 
   Result<std::vector<StoredPlan>> plans(std::size_t limit, const std::optional<PlanId>& after) override {
     return read_value<std::vector<StoredPlan>>(gate_, [&](Connection& c) -> Result<std::vector<StoredPlan>> {
-      static const std::string first = std::string(k_columns) + "ORDER BY id DESC LIMIT ?1";
-      static const std::string next = std::string(k_columns) + "WHERE id < ?1 ORDER BY id DESC LIMIT ?2";
+      static const std::string first = std::string(k_plan_columns) + "ORDER BY id DESC LIMIT ?1";
+      static const std::string next = std::string(k_plan_columns) + "WHERE id < ?1 ORDER BY id DESC LIMIT ?2";
       Query query(c, after ? next : first);
       if (after) query << *after;
       query << row_limit(limit);
       std::vector<StoredPlan> found;
-      while (query.step()) found.push_back(read(query));
+      while (query.step()) found.push_back(read_plan(query));
       return found;
     });
   }
 
   Result<void> remove(const PlanId& id, std::uint64_t expected_version) override {
     return write_void(gate_, [&](Connection& c) -> std::optional<Error> {
-      Query query(c, k_remove);
+      Query query(c, k_plan_remove);
       query << id << expected_version;
       if (query.returned()) return std::nullopt;
       return unchanged(c, id, expected_version);
@@ -110,7 +110,7 @@ class SqlPlanStore final : public PlanStore {
     return write_void(gate_, [&](Connection& c) -> std::optional<Error> {
       const auto key = mission_key(c, mission);
       if (!key) return absent("mission", mission);
-      Query query(c, state_json.empty() ? k_forget : k_keep);
+      Query query(c, state_json.empty() ? k_plan_forget : k_plan_keep);
       query << *key;
       if (!state_json.empty()) query << state_json << now;
       query.run();
@@ -133,7 +133,7 @@ class SqlPlanStore final : public PlanStore {
 
   Result<std::string> procedure(const MissionId& mission) override {
     return read_value<std::string>(gate_, [&](Connection& c) -> Result<std::string> {
-      Query query(c, k_procedure);
+      Query query(c, k_plan_procedure);
       query << mission;
       return query.step() ? query.text() : std::string{};
     });

@@ -14,6 +14,7 @@
 
 #include "server/storage/postgres_arrays.hpp"
 #include "server/storage/postgres_text.hpp"
+#include "server/storage/text_hash.hpp"
 
 namespace anchord::sql {
 namespace {
@@ -251,7 +252,7 @@ std::string password_advice(const PGconn* connection) {
 }
 
 /// Fewer rows are not worth a statement of arrays; more at once only cost memory.
-constexpr std::size_t k_few_rows = 3, k_most_rows = 5000, k_most_bytes = 8u << 20;
+constexpr std::size_t k_few_rows = 3, k_most_array_rows = 5000, k_most_array_bytes = 8u << 20;
 
 /// "a, b, c" apart.
 std::vector<std::string_view> split_columns(std::string_view columns) {
@@ -265,11 +266,6 @@ std::vector<std::string_view> split_columns(std::string_view columns) {
 }
 
 /// A statement is found by its text without a copy of that.
-struct TextHash {
-  using is_transparent = void;
-  std::size_t operator()(std::string_view text) const { return std::hash<std::string_view>{}(text); }
-};
-
 /// PostgreSQL ends its wait for a synchronous standby at a time limit, and reports that as a warning of a
 /// commit that went well: the rows are on its own disk only, and gone where that standby becomes the primary.
 void note_warning(void* warned, const PGresult* notice) {
@@ -359,7 +355,7 @@ Connection::Keys PostgresConnection::insert_rows(const BulkTable& table, std::si
   for (std::size_t at = 0; at < n;) {
     arrays.clear();
     const std::size_t first = at;
-    while (at < n && at - first < k_most_rows && arrays.bytes() < k_most_bytes) {
+    while (at < n && at - first < k_most_array_rows && arrays.bytes() < k_most_array_bytes) {
       row.again();
       bind(row, at++);
     }

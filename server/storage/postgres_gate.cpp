@@ -9,7 +9,7 @@ namespace {
 
 using SteadyClock = std::chrono::steady_clock;
 constexpr auto k_longest_wait = std::chrono::seconds(10);
-constexpr auto k_reopen_every = std::chrono::milliseconds(500);
+constexpr auto k_postgres_gate_reopen_every = std::chrono::milliseconds(500);
 constexpr int k_attempts = 12;
 
 /// SET LOCAL ends with the transaction. An acknowledged row is on the disk also where the server was told not
@@ -122,7 +122,7 @@ std::unique_ptr<PostgresConnection> PostgresPool::opened() {
   } catch (const SqlError& error) {
     auto outage = outage_.lock();
     outage->trouble = error;
-    outage->not_before = SteadyClock::now() + k_reopen_every;
+    outage->not_before = SteadyClock::now() + k_postgres_gate_reopen_every;
     throw;
   }
 }

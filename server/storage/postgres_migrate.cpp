@@ -9,13 +9,14 @@ namespace {
 // statement time-out: a step may rewrite a large table.
 constexpr const char* k_begin =
     "BEGIN ISOLATION LEVEL READ COMMITTED; SET LOCAL statement_timeout = 0; SET LOCAL lock_timeout = '60s'";
-constexpr const char* k_lock = "SELECT pg_advisory_xact_lock(?1) IS NULL";
+constexpr const char* k_postgres_migrate_lock = "SELECT pg_advisory_xact_lock(?1) IS NULL";
 constexpr const char* k_has_versions = "SELECT to_regclass('schema_migration') IS NOT NULL";
 constexpr const char* k_tables =
     "SELECT count(*) FROM pg_class WHERE relkind IN ('r', 'p', 'v') AND relnamespace = "
     "(SELECT oid FROM pg_namespace WHERE nspname = current_schema())";
-constexpr const char* k_applied = "SELECT number, name, sha256_hex FROM schema_migration ORDER BY number";
-constexpr const char* k_record =
+constexpr const char* k_postgres_migrate_applied =
+    "SELECT number, name, sha256_hex FROM schema_migration ORDER BY number";
+constexpr const char* k_postgres_migrate_record =
     "INSERT INTO schema_migration (number, name, sha256_hex, applied_t_ns) VALUES (?1, ?2, ?3, ?4)";
 
 std::int64_t number(PostgresConnection& connection, const char* text) {
@@ -30,7 +31,7 @@ Result<std::size_t> applied(PostgresConnection& connection, std::span<const Migr
     return make_error(Errc::unsupported,
                       "the database has tables of another program: use a database for anchord alone");
   }
-  Query query(connection, k_applied);
+  Query query(connection, k_postgres_migrate_applied);
   std::size_t n = 0;
   while (query.step()) {
     const auto number = query.integer();
@@ -52,7 +53,7 @@ Result<std::size_t> applied(PostgresConnection& connection, std::span<const Migr
 void apply(PostgresConnection& connection, const Migration& migration, UtcTime now) {
   try {
     connection.execute(std::string(migration.sql));
-    Query query(connection, k_record);
+    Query query(connection, k_postgres_migrate_record);
     query << migration.number << migration.name << sha256_hex(migration.sql) << now;
     query.run();
   } catch (const SqlError& error) {
@@ -62,7 +63,7 @@ void apply(PostgresConnection& connection, const Migration& migration, UtcTime n
 
 Result<void> bring_up(PostgresConnection& connection, std::span<const Migration> migrations, UtcTime now) {
   {
-    Query lock(connection, k_lock);
+    Query lock(connection, k_postgres_migrate_lock);
     lock << k_application_id;
     lock.run();
   }

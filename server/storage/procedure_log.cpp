@@ -9,7 +9,7 @@ constexpr const char* k_last_entry =
     "SELECT coalesce(max(number), 0) FROM procedure_log WHERE mission_key = ?1";
 constexpr const char* k_insert_entry =
     "INSERT INTO procedure_log (mission_key, number, t_ns, topic, message_json) VALUES (?1, ?2, ?3, ?4, ?5)";
-constexpr const char* k_entries =
+constexpr const char* k_procedure_log_entries =
     "SELECT number, t_ns, topic, message_json FROM procedure_log WHERE mission_key = ?1 AND number > ?2 "
     "ORDER BY number LIMIT ?3";
 
@@ -42,7 +42,7 @@ class SqlProcedureLog final : public ProcedureLog {
       std::vector<Numbered> found;
       const auto key = mission_key(c, mission);
       if (!key) return found;
-      Query query(c, k_entries);
+      Query query(c, k_procedure_log_entries);
       query << *key << after << row_limit(limit);
       for (std::size_t bytes = 0; bytes < k_page_bytes && query.step();) {
         Numbered one;

@@ -12,8 +12,8 @@
 namespace anchord::sql {
 namespace {
 
-constexpr std::size_t k_page_bytes = 4u << 20, k_most_rows = 5000;
-constexpr const char* k_columns =
+constexpr std::size_t k_row_tables_page_bytes = 4u << 20, k_most_rows = 5000;
+constexpr const char* k_row_tables_columns =
     "SELECT m.name, p.name, p.type, p.pk FROM sqlite_schema m JOIN pragma_table_info(m.name) p "
     "WHERE m.type = 'table' AND m.name NOT IN ('schema_migration', 'server_lease') ORDER BY m.name, p.cid";
 constexpr const char* k_references =
@@ -105,7 +105,7 @@ std::vector<RowTable> row_tables() {
   const auto made = migrate(schema, sqlite_migrations(), {}, UtcTime{});
   ANCHORD_CHECK(made, made.error().message);
   std::map<std::string, RowTable> waiting;
-  Query columns(schema, k_columns);
+  Query columns(schema, k_row_tables_columns);
   while (columns.step()) {
     const auto name = columns.text();
     RowTable& table = waiting[name];
@@ -160,8 +160,8 @@ std::vector<Cells> RowPages::next() {
   if (page.empty()) return page;
   after_.clear();
   for (const auto column : table_.key) after_.push_back(page.back()[column]);
-  rows_ =
-      std::clamp<std::size_t>(k_page_bytes / std::max<std::size_t>(1, bytes / page.size()), 1, k_most_rows);
+  rows_ = std::clamp<std::size_t>(k_row_tables_page_bytes / std::max<std::size_t>(1, bytes / page.size()), 1,
+                                  k_most_rows);
   return page;
 }
 

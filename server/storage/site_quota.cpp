@@ -12,7 +12,7 @@ struct Owner {
 };
 
 // By what the appends counted, as in measurement_store.cpp.
-constexpr Owner<k_quota_kinds> k_site{
+constexpr Owner<k_quota_kinds> k_quota_site{
     "SELECT max_missions, max_measurements, max_anchors FROM site_quota WHERE site_id = ?1",
     "SELECT name FROM site WHERE id = ?1",
     {"SELECT count(*) FROM mission WHERE site_id = ?1",
@@ -122,7 +122,7 @@ std::optional<OrganizationId> organization_of(Connection& c, const std::optional
 /// By the site's own quota, then by that of its organization, unless it comes from a site of the same.
 std::optional<Error> beyond_either(Connection& c, const SiteId& site, const SiteCounts& more, bool counted,
                                    const std::optional<SiteId>& from) {
-  if (auto error = beyond(c, k_site, site, more, counted)) return error;
+  if (auto error = beyond(c, k_quota_site, site, more, counted)) return error;
   const auto organization = organization_of(c, site);
   if (!organization || organization == organization_of(c, from)) return std::nullopt;
   return beyond(c, k_organization, *organization, {more[0], more[1], more[2], 0}, counted);
@@ -131,7 +131,7 @@ std::optional<Error> beyond_either(Connection& c, const SiteId& site, const Site
 }  // namespace
 
 SiteQuota read_quota(Connection& connection, const SiteId& site) {
-  return quota_of(connection, k_site, site);
+  return quota_of(connection, k_quota_site, site);
 }
 
 OrganizationQuota read_quota(Connection& connection, const OrganizationId& organization) {
@@ -176,7 +176,7 @@ std::optional<Error> beyond_quota_now(Connection& connection, const SiteId& site
 std::optional<Error> beyond_quota(Connection& connection, const std::optional<OrganizationId>& organization,
                                   const SiteId& site) {
   if (!organization || !limits_of(connection, k_organization, *organization)) return std::nullopt;
-  const SiteCounts brought = quota_of(connection, k_site, site).used;
+  const SiteCounts brought = quota_of(connection, k_quota_site, site).used;
   return beyond(connection, k_organization, *organization, {brought[0], brought[1], brought[2], 1}, false);
 }
 

@@ -9,6 +9,8 @@
 #include <cstring>
 #include <unordered_map>
 
+#include "server/storage/text_hash.hpp"
+
 namespace anchord::sql {
 namespace {
 
@@ -150,11 +152,6 @@ void count_no_memory() {
 }
 
 /// A prepared statement is found by its text without a copy of that.
-struct TextHash {
-  using is_transparent = void;
-  std::size_t operator()(std::string_view text) const { return std::hash<std::string_view>{}(text); }
-};
-
 }  // namespace
 
 struct SqliteConnection::State {

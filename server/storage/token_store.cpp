@@ -3,17 +3,17 @@
 namespace anchord::sql {
 namespace {
 
-constexpr const char* k_insert =
+constexpr const char* k_token_insert =
     "INSERT INTO token (id, name, secret_sha256_hex, created_t_ns, expires_t_ns, revoked_t_ns, "
     "last_used_t_ns, bound, organization_id, requests_per_minute) "
     "VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10)";
 constexpr const char* k_insert_role = "INSERT INTO token_role (token_id, ordinal, role) VALUES (?1, ?2, ?3)";
 constexpr const char* k_insert_site = "INSERT INTO token_site (token_id, site_id) VALUES (?1, ?2)";
-constexpr const char* k_columns =
+constexpr const char* k_token_columns =
     "SELECT id, name, secret_sha256_hex, created_t_ns, expires_t_ns, revoked_t_ns, last_used_t_ns, bound, "
     "organization_id, requests_per_minute FROM token ";
 constexpr const char* k_roles = "SELECT role FROM token_role WHERE token_id = ?1 ORDER BY ordinal";
-constexpr const char* k_sites = "SELECT site_id FROM token_site WHERE token_id = ?1";
+constexpr const char* k_token_sites = "SELECT site_id FROM token_site WHERE token_id = ?1";
 // A second revocation keeps the time of the first.
 constexpr const char* k_revoke =
     "UPDATE token SET revoked_t_ns = coalesce(revoked_t_ns, ?2) WHERE id = ?1 RETURNING revoked_t_ns";
@@ -26,7 +26,7 @@ constexpr const char* k_sessions =
     "SELECT cookie_sha256_hex, token_id, until_t_ns FROM browser_session ORDER BY until_t_ns, "
     "cookie_sha256_hex";
 
-Token read(Connection& c, Query& query) {
+Token read_token(Connection& c, Query& query) {
   Token token;
   token.id = query.id<TokenId>();
   token.name = query.text();
@@ -43,7 +43,7 @@ Token read(Connection& c, Query& query) {
   while (roles.step()) token.roles.push_back(roles.text());
   if (!bound) return token;
   std::vector<SiteId> ids;
-  Query sites(c, k_sites);
+  Query sites(c, k_token_sites);
   sites << token.id;
   while (sites.step()) ids.push_back(sites.id<SiteId>());
   token.sites = SiteSet::only(std::move(ids));
@@ -57,7 +57,7 @@ class SqlTokenStore final : public TokenStore {
   Result<void> insert(const Token& token) override {
     return write_void(gate_, [&](Connection& c) -> std::optional<Error> {
       if (auto missing = missing_organization(c, token.organization)) return missing;
-      Query query(c, k_insert);
+      Query query(c, k_token_insert);
       query << token.id << token.name << token.secret_sha256_hex << token.created << token.expires
             << token.revoked << token.last_used << (token.organization || !token.sites.all())
             << token.organization << std::optional<std::uint64_t>(token.requests_per_minute);
@@ -83,9 +83,9 @@ class SqlTokenStore final : public TokenStore {
   }
   Result<std::vector<Token>> tokens() override {
     return read_value<std::vector<Token>>(gate_, [&](Connection& c) -> Result<std::vector<Token>> {
-      Query query(c, std::string(k_columns) + "ORDER BY id");
+      Query query(c, std::string(k_token_columns) + "ORDER BY id");
       std::vector<Token> found;
-      while (query.step()) found.push_back(read(c, query));
+      while (query.step()) found.push_back(read_token(c, query));
       return found;
     });
   }
@@ -131,10 +131,10 @@ class SqlTokenStore final : public TokenStore {
   template <class Key>
   Result<Token> find(const char* where, const Key& key) {
     return read_value<Token>(gate_, [&](Connection& c) -> Result<Token> {
-      Query query(c, std::string(k_columns) + where);
+      Query query(c, std::string(k_token_columns) + where);
       query << key;
       if (!query.step()) return make_error(Errc::not_found, "no such token");
-      return read(c, query);
+      return read_token(c, query);
     });
   }
   Result<void> stamp(const char* text, const TokenId& id, UtcTime now) {

@@ -4,26 +4,27 @@
 namespace anchord::sql {
 namespace {
 
-constexpr const char* k_insert =
+constexpr const char* k_training_run_insert =
     "INSERT INTO training_run (id, dataset_key, task, request_json, summary_json, created_t_ns, created_by) "
     "SELECT ?1, dataset_key, ?3, ?4, ?5, ?6, ?7 FROM dataset WHERE id = ?2 RETURNING run_key";
-constexpr const char* k_columns =
+constexpr const char* k_training_run_columns =
     "SELECT r.id, d.id, r.task, r.request_json, r.summary_json, (SELECT m.id FROM model m WHERE m.run_key = "
     "r.run_key ORDER BY m.model_key DESC LIMIT 1), r.created_t_ns, r.created_by FROM training_run r JOIN "
     "dataset d ON d.dataset_key = r.dataset_key ";
-constexpr const char* k_finish = "UPDATE training_run SET summary_json = ?2 WHERE id = ?1 RETURNING run_key";
+constexpr const char* k_training_run_finish =
+    "UPDATE training_run SET summary_json = ?2 WHERE id = ?1 RETURNING run_key";
 constexpr const char* k_drop_parts = "DELETE FROM training_part WHERE run_key = ?1";
 constexpr const char* k_insert_part = "INSERT INTO training_part (run_key, name, json) VALUES (?1, ?2, ?3)";
-constexpr const char* k_part =
+constexpr const char* k_training_run_part =
     "SELECT p.json FROM training_part p JOIN training_run r ON r.run_key = p.run_key WHERE r.id = ?1 AND "
     "p.name = ?2";
-constexpr const char* k_remove = "DELETE FROM training_run WHERE id = ?1 RETURNING run_key";
+constexpr const char* k_training_run_remove = "DELETE FROM training_run WHERE id = ?1 RETURNING run_key";
 
 Error no_run(const TrainingRunId& id) {
   return make_error(Errc::not_found, "no training run " + to_string(id));
 }
 
-TrainingRun read(Query& query) {
+TrainingRun read_training_run(Query& query) {
   TrainingRun r;
   r.id = query.id<TrainingRunId>();
   r.dataset = query.id<DatasetId>();
@@ -42,7 +43,7 @@ class SqlTrainingRunStore final : public TrainingRunStore {
 
   Result<void> insert(const TrainingRun& r) override {
     return write_void(gate_, [&](Connection& c) -> std::optional<Error> {
-      Query query(c, k_insert);
+      Query query(c, k_training_run_insert);
       query << r.id << r.dataset << r.task << r.request << r.summary << r.created << r.created_by;
       if (query.returned()) return std::nullopt;
       return make_error(Errc::not_found, "no data set " + to_string(r.dataset));
@@ -51,10 +52,10 @@ class SqlTrainingRunStore final : public TrainingRunStore {
 
   Result<TrainingRun> run(const TrainingRunId& id) override {
     return read_value<TrainingRun>(gate_, [&](Connection& c) -> Result<TrainingRun> {
-      Query query(c, std::string(k_columns) + "WHERE r.id = ?1");
+      Query query(c, std::string(k_training_run_columns) + "WHERE r.id = ?1");
       query << id;
       if (!query.step()) return no_run(id);
-      return read(query);
+      return read_training_run(query);
     });
   }
 
@@ -62,12 +63,12 @@ class SqlTrainingRunStore final : public TrainingRunStore {
                                         const std::optional<std::string>& task) override {
     return read_value<std::vector<TrainingRun>>(
         gate_, [&](Connection& c) -> Result<std::vector<TrainingRun>> {
-          Query query(c, std::string(k_columns) +
+          Query query(c, std::string(k_training_run_columns) +
                              "WHERE (?1 IS NULL OR r.id < ?1) AND (?2 IS NULL OR r.task = ?2) "
                              "ORDER BY r.id DESC LIMIT ?3");
           query << after << task << row_limit(limit);
           std::vector<TrainingRun> found;
-          while (query.step()) found.push_back(read(query));
+          while (query.step()) found.push_back(read_training_run(query));
           return found;
         });
   }
@@ -76,7 +77,7 @@ class SqlTrainingRunStore final : public TrainingRunStore {
                       const std::map<std::string, std::string>& parts, const StoredModel& model,
                       std::string_view artifact) override {
     return write_void(gate_, [&](Connection& c) -> std::optional<Error> {
-      Query query(c, k_finish);
+      Query query(c, k_training_run_finish);
       query << id << summary;
       const auto key = query.returned();
       if (!key) return no_run(id);
@@ -96,7 +97,7 @@ class SqlTrainingRunStore final : public TrainingRunStore {
 
   Result<std::string> part(const TrainingRunId& id, std::string_view name) override {
     return read_value<std::string>(gate_, [&](Connection& c) -> Result<std::string> {
-      Query query(c, k_part);
+      Query query(c, k_training_run_part);
       query << id << name;
       if (!query.step())
         return make_error(Errc::not_found, "training run " + to_string(id) + " has no " + std::string(name));
@@ -106,7 +107,7 @@ class SqlTrainingRunStore final : public TrainingRunStore {
 
   Result<void> remove(const TrainingRunId& id) override {
     return write_void(gate_, [&](Connection& c) -> std::optional<Error> {
-      Query query(c, k_remove);
+      Query query(c, k_training_run_remove);
       query << id;
       if (query.returned()) return std::nullopt;
       return no_run(id);

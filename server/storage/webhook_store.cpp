@@ -3,16 +3,16 @@
 namespace anchord::sql {
 namespace {
 
-constexpr const char* k_insert =
+constexpr const char* k_webhook_insert =
     "INSERT INTO webhook (id, name, url, secret, events, enabled, created_t_ns, version, kind, dialect, "
     "token) VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11)";
-constexpr const char* k_update =
+constexpr const char* k_webhook_update =
     "UPDATE webhook SET name = ?2, url = ?3, secret = ?4, events = ?5, enabled = ?6, version = ?7, "
     "dialect = ?9, token = ?10 WHERE id = ?1 AND version = ?8 RETURNING version";
-constexpr const char* k_columns =
+constexpr const char* k_webhook_columns =
     "SELECT id, name, url, secret, events, enabled, created_t_ns, version, kind, dialect, token FROM "
     "webhook ";
-constexpr const char* k_remove = "DELETE FROM webhook WHERE id = ?1 RETURNING webhook_key";
+constexpr const char* k_webhook_remove = "DELETE FROM webhook WHERE id = ?1 RETURNING webhook_key";
 constexpr const char* k_add =
     "INSERT INTO webhook_delivery (id, webhook_key, event, body, state, created_t_ns, attempts, due_ran_ns, "
     "tried_t_ns, status, fault) SELECT ?1, webhook_key, ?3, ?4, ?5, ?6, ?7, ?8, NULL, NULL, '' FROM webhook "
@@ -24,7 +24,7 @@ constexpr const char* k_forget_old =
 constexpr const char* k_delivery_columns =
     "SELECT d.id, w.id, d.event, d.body, d.state, d.created_t_ns, d.attempts, d.due_ran_ns, d.tried_t_ns, "
     "d.status, d.fault FROM webhook_delivery AS d JOIN webhook AS w ON w.webhook_key = d.webhook_key ";
-constexpr const char* k_record =
+constexpr const char* k_webhook_record =
     "UPDATE webhook_delivery SET state = ?2, attempts = ?3, due_ran_ns = ?4, tried_t_ns = ?5, status = ?6, "
     "fault = ?7 WHERE id = ?1";
 
@@ -44,7 +44,7 @@ std::vector<std::string> parted(const std::string& text) {
   return out;
 }
 
-std::vector<Webhook> all(Query& query) {
+std::vector<Webhook> all_webhooks(Query& query) {
   std::vector<Webhook> found;
   while (query.step()) {
     Webhook w;
@@ -90,7 +90,7 @@ class SqlWebhookStore final : public WebhookStore {
 
   Result<void> insert(const Webhook& w) override {
     return write_void(gate_, [&](Connection& c) -> std::optional<Error> {
-      Query query(c, k_insert);
+      Query query(c, k_webhook_insert);
       query << w.id << w.name << w.url << w.secret << joined(w.events) << w.enabled << w.created << w.version
             << static_cast<std::uint8_t>(w.kind) << static_cast<std::uint8_t>(w.dialect) << w.token;
       query.run();
@@ -99,11 +99,11 @@ class SqlWebhookStore final : public WebhookStore {
   }
   Result<void> update(const Webhook& w, std::uint64_t expected_version) override {
     return write_void(gate_, [&](Connection& c) -> std::optional<Error> {
-      Query query(c, k_update);
+      Query query(c, k_webhook_update);
       query << w.id << w.name << w.url << w.secret << joined(w.events) << w.enabled << expected_version + 1
             << expected_version << static_cast<std::uint8_t>(w.dialect) << w.token;
       if (query.returned()) return std::nullopt;
-      Query known(c, std::string(k_columns) + "WHERE id = ?1");
+      Query known(c, std::string(k_webhook_columns) + "WHERE id = ?1");
       known << w.id;
       if (known.step()) return make_error(Errc::conflict, "the webhook was changed in the meantime");
       return absent("webhook", w.id);
@@ -111,22 +111,22 @@ class SqlWebhookStore final : public WebhookStore {
   }
   Result<Webhook> webhook(const WebhookId& id) override {
     return read_value<Webhook>(gate_, [&](Connection& c) -> Result<Webhook> {
-      Query query(c, std::string(k_columns) + "WHERE id = ?1");
+      Query query(c, std::string(k_webhook_columns) + "WHERE id = ?1");
       query << id;
-      auto found = all(query);
+      auto found = all_webhooks(query);
       if (found.empty()) return absent("webhook", id);
       return std::move(found.front());
     });
   }
   Result<std::vector<Webhook>> webhooks() override {
     return read_value<std::vector<Webhook>>(gate_, [&](Connection& c) -> Result<std::vector<Webhook>> {
-      Query query(c, std::string(k_columns) + "ORDER BY webhook_key");
-      return all(query);
+      Query query(c, std::string(k_webhook_columns) + "ORDER BY webhook_key");
+      return all_webhooks(query);
     });
   }
   Result<void> remove(const WebhookId& id) override {
     return write_void(gate_, [&](Connection& c) -> std::optional<Error> {
-      Query query(c, k_remove);
+      Query query(c, k_webhook_remove);
       query << id;
       if (query.returned()) return std::nullopt;
       return absent("webhook", id);
@@ -157,7 +157,7 @@ class SqlWebhookStore final : public WebhookStore {
   }
   Result<void> record(const WebhookDelivery& d) override {
     return write_void(gate_, [&](Connection& c) -> std::optional<Error> {
-      Query query(c, k_record);
+      Query query(c, k_webhook_record);
       query << d.id << static_cast<std::uint8_t>(d.state) << d.attempts << d.due_ran_ns << d.tried << d.status
             << d.fault;
       query.run();

@@ -9,12 +9,12 @@
 namespace anchord::sql {
 namespace {
 
-constexpr const char* k_remove = "DELETE FROM work WHERE job_id = ?1 AND (?2 IS NULL OR fence = ?2)";
-constexpr const char* k_insert =
+constexpr const char* k_work_remove = "DELETE FROM work WHERE job_id = ?1 AND (?2 IS NULL OR fence = ?2)";
+constexpr const char* k_work_insert =
     "INSERT INTO work (job_id, kind, version, message, state, fence, attempts, max_attempts, worker, "
     "open_t_ns, lease_t_ns, cancel_wanted, fraction, stage, detail, fault, result, error_code, error_text) "
     "VALUES (?1, ?2, ?3, ?4, 0, now_ns(), 0, ?5, '', now_ns(), 0, 0, 0, 'queued', '', '', NULL, '', '')";
-constexpr const char* k_all =
+constexpr const char* k_work_all =
     "SELECT job_id, kind, version, state, fence, worker, attempts, max_attempts, fraction, stage, detail, "
     "fault, "
     "CASE WHEN state = 0 THEN now_ns() - open_t_ns WHEN state = 1 AND lease_t_ns < now_ns() THEN now_ns() - "
@@ -22,7 +22,7 @@ constexpr const char* k_all =
 constexpr const char* k_outcome =
     "SELECT state, error_code, error_text, octet_length(result), CASE WHEN octet_length(result) > ?2 THEN '' "
     "ELSE result END FROM work WHERE job_id = ?1";
-constexpr const char* k_state = "SELECT state FROM work WHERE job_id = ?1";
+constexpr const char* k_work_state = "SELECT state FROM work WHERE job_id = ?1";
 constexpr const char* k_cancel_open =
     "UPDATE work SET state = 2, error_code = 'canceled', error_text = 'canceled' WHERE job_id = ?1";
 constexpr const char* k_cancel_claimed = "UPDATE work SET cancel_wanted = 1 WHERE job_id = ?1";
@@ -50,7 +50,7 @@ constexpr const char* k_end_hopeless =
 constexpr const char* k_beat =
     "UPDATE work SET lease_t_ns = now_ns() + ?3, fraction = ?4, stage = ?5, detail = ?6 WHERE job_id = ?1 "
     "AND fence = ?2 AND state = 1 RETURNING cancel_wanted";
-constexpr const char* k_finish =
+constexpr const char* k_work_finish =
     "UPDATE work SET state = 2, result = ?3 WHERE job_id = ?1 AND fence = ?2 AND state = 1 RETURNING state";
 constexpr const char* k_fail =
     "UPDATE work SET state = 2, error_code = ?3, error_text = ?4 WHERE job_id = ?1 AND fence = ?2 AND state "
@@ -63,7 +63,7 @@ constexpr const char* k_open_again =
 constexpr const char* k_seen =
     "INSERT INTO worker (name, version, started_t_ns, seen_t_ns) VALUES (?1, ?2, now_ns(), now_ns()) ON "
     "CONFLICT (name) DO UPDATE SET version = excluded.version, seen_t_ns = excluded.seen_t_ns";
-constexpr const char* k_forget =
+constexpr const char* k_work_forget =
     "DELETE FROM worker WHERE seen_t_ns < now_ns() - 86400 * CAST(1000000000 AS BIGINT)";
 constexpr const char* k_gone = "DELETE FROM worker WHERE name = ?1";
 constexpr const char* k_workers =
@@ -86,11 +86,11 @@ class SqlWorkStore final : public WorkStore {
   Result<void> offer(const NewWork& work) override {
     return write_void(gate_, [&](Connection& c) -> std::optional<Error> {
       {
-        Query older(c, k_remove);
+        Query older(c, k_work_remove);
         older << work.job << std::nullopt;
         older.run();
       }
-      Query query(c, k_insert);
+      Query query(c, k_work_insert);
       query << work.job << work.kind << work.version << work.message << work.max_attempts;
       query.run();
       return std::nullopt;
@@ -104,7 +104,7 @@ class SqlWorkStore final : public WorkStore {
   }
   Result<std::vector<WorkStatus>> all() override {
     return read_value<std::vector<WorkStatus>>(gate_, [&](Connection& c) -> Result<std::vector<WorkStatus>> {
-      Query query(c, k_all);
+      Query query(c, k_work_all);
       std::vector<WorkStatus> found;
       while (query.step()) {
         WorkStatus s;
@@ -148,7 +148,7 @@ class SqlWorkStore final : public WorkStore {
   }
   Result<void> remove(const JobId& job, std::optional<std::int64_t> fence) override {
     return write_void(gate_, [&](Connection& c) -> std::optional<Error> {
-      Query query(c, k_remove);
+      Query query(c, k_work_remove);
       query << job << fence;
       query.run();
       return std::nullopt;
@@ -158,7 +158,7 @@ class SqlWorkStore final : public WorkStore {
     return write_value<bool>(gate_, 1, [&](Connection& c) -> Result<bool> {
       std::optional<WorkState> state;
       {
-        Query query(c, k_state);
+        Query query(c, k_work_state);
         query << job;
         if (!query.step()) return false;
         state = query.one_of(k_work_state_words);
@@ -202,7 +202,7 @@ class SqlWorkStore final : public WorkStore {
     });
   }
   Result<void> finish(const WorkClaim& claim, std::string_view result) override {
-    return guarded_write(claim, k_finish, [&](Query& query) { query << result; });
+    return guarded_write(claim, k_work_finish, [&](Query& query) { query << result; });
   }
   Result<void> fail(const WorkClaim& claim, const Error& error) override {
     return guarded_write(claim, k_fail,
@@ -244,7 +244,7 @@ class SqlWorkStore final : public WorkStore {
       Query query(c, k_gone);
       query << worker;
       query.run();
-      Query(c, k_forget).run();
+      Query(c, k_work_forget).run();
       return std::nullopt;
     });
   }

@@ -9,12 +9,12 @@ namespace {
 
 using SteadyClock = std::chrono::steady_clock;
 constexpr auto k_idle = std::chrono::milliseconds(500);
-constexpr auto k_reopen_every = std::chrono::milliseconds(500);
+constexpr auto k_write_queue_reopen_every = std::chrono::milliseconds(500);
 constexpr auto k_save_every = std::chrono::seconds(30);
 // One commit holds at most so much: a caller with one row should not wait for a flood before it.
 constexpr std::size_t k_group_rows = 20'000;
 constexpr std::size_t k_group_calls = 256;
-constexpr std::uint64_t k_page_bytes = 8192;
+constexpr std::uint64_t k_write_queue_page_bytes = 8192;
 
 }  // namespace
 
@@ -210,7 +210,7 @@ bool WriteQueue::ensure_connection() {
   if (connection_ != nullptr) return true;
   const auto now = SteadyClock::now();
   if (now < next_reopen_) return false;
-  next_reopen_ = now + k_reopen_every;
+  next_reopen_ = now + k_write_queue_reopen_every;
   try {
     auto connection = open_();
     // A connection opened while the disk was read-only stays so for ever.
@@ -261,8 +261,8 @@ void WriteQueue::watch_place() {
 
 void WriteQueue::checkpoint_if(bool due) {
   if (connection_ == nullptr || connection_->wal_pages() == 0) return;
-  if (!due &&
-      static_cast<std::uint64_t>(connection_->wal_pages()) * k_page_bytes < limits_.checkpoint_wal_bytes)
+  if (!due && static_cast<std::uint64_t>(connection_->wal_pages()) * k_write_queue_page_bytes <
+                  limits_.checkpoint_wal_bytes)
     return;
   try {
     connection_->checkpoint_passive();
