@@ -42,10 +42,13 @@ Response list(AnchorApi& s, const Request& request) {
     return s.file(format, request);
   check_query(request, {"view", "revision", "mission", "site", "bbox", "limit", "cursor", "format"});
   const auto page = page_query(request);
+  const auto [cursor, of_revision] = revision_cursor(page.cursor);
+  Request asked = request;
+  if (of_revision) asked.query["revision"] = std::to_string(*of_revision);
   std::uint64_t number = 0;
-  auto all = selected_anchors(s, request, number);
-  if (!page.cursor.empty()) {
-    const auto after = parse_network_id(page.cursor);
+  auto all = selected_anchors(s, asked, number);
+  if (!cursor.empty()) {
+    const auto after = parse_network_id(cursor);
     if (!after)
       throw_problem(422, "validation", "cursor was not issued by this server",
                     {{"/cursor", "bad_cursor", "was not issued by this server"}});
@@ -54,7 +57,7 @@ Response list(AnchorApi& s, const Request& request) {
   std::string next;
   if (all.size() > page.limit) {
     all.resize(page.limit);
-    next = to_string(all.back().anchor.network_id);
+    next = revision_cursor_text(to_string(all.back().anchor.network_id), number);
   }
   if (format == "csv") return as_csv(all);
   if (format == "ndjson") {

@@ -52,7 +52,7 @@ std::optional<LonLatBox> query_box(const Request& request) {
     throw_problem(422, "validation", "bbox must be west,south,east,north in degrees",
                   {{"/bbox", "bad_value", "must be four numbers"}});
   }
-  const LonLatBox box{numbers[0], numbers[1], numbers[2], numbers[3]};
+  const LonLatBox box = lon_lat_box(numbers[0], numbers[1], numbers[2], numbers[3]);
   if (box.south > box.north)
     throw_problem(422, "validation", "bbox must be west,south,east,north in degrees",
                   {{"/bbox", "bad_value", "has its south above its north"}});

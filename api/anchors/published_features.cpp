@@ -1,6 +1,7 @@
 #include "api/anchors/published_features.hpp"
 
 #include <algorithm>
+#include <charconv>
 #include <map>
 #include <nlohmann/json.hpp>
 
@@ -188,6 +189,24 @@ std::optional<AnchorFeature> published_feature(AnchorApi& s, const Anchor& ancho
   if (const auto against = contradicted->find(anchor.network_id); against != contradicted->end())
     contradict(s, out, against->second);
   return out;
+}
+
+RevisionCursor revision_cursor(const std::string& text) {
+  const auto dot = text.find('.');
+  RevisionCursor out{text.substr(0, dot)};
+  if (dot == std::string::npos) return out;
+  std::uint64_t number = 0;
+  const char* end = text.data() + text.size();
+  const auto [stop, error] = std::from_chars(text.data() + dot + 1, end, number);
+  if (error == std::errc{} && stop == end && number > 0)
+    out.revision = number;
+  else
+    out.after = text;  // which no anchor is
+  return out;
+}
+
+std::string revision_cursor_text(const std::string& after, std::uint64_t revision) {
+  return revision == 0 ? after : after + '.' + std::to_string(revision);
 }
 
 }  // namespace anchord::api

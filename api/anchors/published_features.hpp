@@ -43,6 +43,15 @@ std::uint64_t newest_revision(AnchorApi& services);
 std::vector<AnchorFeature> published_features(AnchorApi& services, std::optional<std::uint64_t> revision,
                                               std::uint64_t& number);
 
+/// Cursor of a page of published anchors: after which of them, and in which revision, so that pages read
+/// while another one is published are of one. `text` without a revision is of the newest.
+struct RevisionCursor {
+  std::string after;
+  std::optional<std::uint64_t> revision{};
+};
+RevisionCursor revision_cursor(const std::string& text);
+std::string revision_cursor_text(const std::string& after, std::uint64_t revision);
+
 /// That of one anchor in the newest revision, without reading the others; none: it has no place there.
 std::optional<AnchorFeature> published_feature(AnchorApi& services, const Anchor& anchor);
 

@@ -65,14 +65,15 @@ FileHeight checked_height(const Anchors& anchors, const Request& request) {
 
 struct File {
   std::string_view format, type, name;
-  bool has_height;  ///< takes height=
+  bool has_height;    ///< takes height=
+  bool says_retired;  ///< else such anchors are left out: who draws or positions by the file would use them
 };
-constexpr std::array k_files{File{"kml", "application/vnd.google-earth.kml+xml", "anchors.kml", false},
-                             File{"gpkg", "application/geopackage+sqlite3", "anchors.gpkg", false},
-                             File{"dxf", "image/vnd.dxf", "anchors.dxf", true},
-                             File{"ifc", "application/x-step", "anchors.ifc", true},
-                             File{"pnezd", "text/csv; charset=utf-8", "anchors-pnezd.csv", true},
-                             File{"pozyx", "application/json", "pozyx.json", false}};
+constexpr std::array k_files{File{"kml", "application/vnd.google-earth.kml+xml", "anchors.kml", false, true},
+                             File{"gpkg", "application/geopackage+sqlite3", "anchors.gpkg", false, true},
+                             File{"dxf", "image/vnd.dxf", "anchors.dxf", true, false},
+                             File{"ifc", "application/x-step", "anchors.ifc", true, true},
+                             File{"pnezd", "text/csv; charset=utf-8", "anchors-pnezd.csv", true, false},
+                             File{"pozyx", "application/json", "pozyx.json", false, false}};
 
 std::string bytes_of(ExchangeApi& s, std::string_view format, const Anchors& anchors,
                      const Request& request) {
@@ -115,7 +116,8 @@ Response anchor_file(ExchangeApi& s, std::string_view format, const Request& req
   else
     check_query(request, {"revision", "site", "bbox", "format"});
   std::uint64_t number = 0;
-  const auto anchors = selected_anchors(s.anchors, request, number);
+  auto anchors = selected_anchors(s.anchors, request, number);
+  if (!file->says_retired) std::erase_if(anchors, [](const auto& feature) { return feature.anchor.retired; });
   if (anchors.empty()) refuse_if_anchors_are_in_no_site(s, request);
   Response response;
   response.body = bytes_of(s, format, anchors, request);

@@ -64,13 +64,26 @@ OgcBox box_of(const Request& request, const std::string& text) {
     std::swap(n[3], n[4]);
   }
   if (n[1] > n[4] || n[2] > n[5]) bad("bbox", "has its lower corner above its upper one");
-  return {{n[0], n[1], n[3], n[4]}, n[2], n[5]};
+  return {lon_lat_box(n[0], n[1], n[3], n[4]), n[2], n[5]};
 }
 
+/// "+01:30" in minutes.
+std::optional<int> offset_min(std::string_view text) {
+  const auto digit = [&](std::size_t i) { return text[i] >= '0' && text[i] <= '9'; };
+  if (text.size() != 6 || (text[0] != '+' && text[0] != '-') || text[3] != ':') return std::nullopt;
+  if (!digit(1) || !digit(2) || !digit(4) || !digit(5)) return std::nullopt;
+  const int hours = 10 * (text[1] - '0') + text[2] - '0', minutes = 10 * (text[4] - '0') + text[5] - '0';
+  if (hours > 23 || minutes > 59) return std::nullopt;
+  return (text[0] == '-' ? -1 : 1) * (60 * hours + minutes);
+}
+
+/// Also with an offset to UTC, as clients of OGC API send it.
 std::optional<UtcTime> instant(std::string_view text) {
   if (text.empty() || text == "..") return std::nullopt;
-  const auto time = parse_rfc3339(text);
+  const auto offset = text.size() > 6 ? offset_min(text.substr(text.size() - 6)) : std::nullopt;
+  auto time = parse_rfc3339(offset ? std::string(text.substr(0, text.size() - 6)) + 'Z' : std::string(text));
   if (!time) bad("datetime", "must be an RFC 3339 time, or two with / between them; .. is an open end");
+  time.value().ns -= std::int64_t{60} * 1'000'000'000 * offset.value_or(0);
   return time.value();
 }
 

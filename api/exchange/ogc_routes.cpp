@@ -58,10 +58,9 @@ Item item_of(const AnchorFeature& feature, std::string key) {
   return out;
 }
 
-std::vector<Item> anchor_items(ExchangeApi& s) {
-  std::uint64_t number = 0;
+std::vector<Item> anchor_items(ExchangeApi& s, std::optional<std::uint64_t> revision, std::uint64_t& number) {
   std::vector<Item> out;
-  for (const auto& feature : published_features(s.anchors, std::nullopt, number))
+  for (const auto& feature : published_features(s.anchors, revision, number))
     out.push_back(item_of(feature, to_string(feature.anchor.network_id)));
   return out;
 }
@@ -105,7 +104,9 @@ std::vector<Item> zone_items(ExchangeApi& s) {
 /// Of the collections that are made whole: all but tracks.
 std::vector<Item> items_of(ExchangeApi& s, const OgcCollection& collection) {
   if (collection.id == "zones") return zone_items(s);
-  return collection.id == "anchors" ? anchor_items(s) : revision_items(s);
+  if (collection.id == "revisions") return revision_items(s);
+  std::uint64_t number = 0;
+  return anchor_items(s, std::nullopt, number);
 }
 
 Ordered track_json(const Mission& mission, const FlightTrack& track) {
@@ -184,6 +185,14 @@ Response page_answer(const Request& request, const OgcCollection& collection, co
   return answer(body, query.crs);
 }
 
+[[noreturn]] void refuse_cursor() {
+  throw_problem(
+      400, "malformed",
+      "cursor was not issued by this server, or its page no longer exists: start again from the first "
+      "page",
+      {{"/cursor", "bad_cursor", "was not issued by this server"}});
+}
+
 /// Of a list that was made whole.
 Page page_of(std::vector<Item> all, const OgcQuery& query) {
   std::erase_if(all, [&](const Item& item) { return !wanted(item, query); });
@@ -192,11 +201,7 @@ Page page_of(std::vector<Item> all, const OgcQuery& query) {
   auto from = all.begin();
   if (!query.cursor.empty()) {
     from = std::ranges::find(all, query.cursor, &Item::key);
-    if (from == all.end())
-      throw_problem(400, "malformed",
-                    "cursor was not issued by this server, or its page no longer exists: start again from "
-                    "the first page",
-                    {{"/cursor", "bad_cursor", "was not issued by this server"}});
+    if (from == all.end()) refuse_cursor();
   }
   for (; from != all.end(); ++from) {
     if (page.features.size() == query.limit) {
@@ -208,15 +213,25 @@ Page page_of(std::vector<Item> all, const OgcQuery& query) {
   return page;
 }
 
+/// All pages of one revision, whatever is published between them.
+Page anchor_page(ExchangeApi& s, OgcQuery query) {
+  const auto cursor = revision_cursor(query.cursor);
+  if (cursor.revision > newest_revision(s.anchors)) refuse_cursor();
+  std::uint64_t number = 0;
+  auto all = anchor_items(s, cursor.revision, number);
+  query.cursor = cursor.after;
+  Page page = page_of(std::move(all), query);
+  if (!page.next.empty()) page.next = revision_cursor_text(page.next, number);
+  return page;
+}
+
 /// Looks at no more flights than the page may hold, so that a filter costs no more than a page: one with few
 /// features, or none, may have a next one.
 Page track_page(ExchangeApi& s, const OgcQuery& query) {
   std::optional<MissionId> after;
   if (!query.cursor.empty()) {
     const auto id = parse_uuid(query.cursor);
-    if (!id)
-      throw_problem(400, "malformed", "cursor was not issued by this server",
-                    {{"/cursor", "bad_cursor", "was not issued by this server"}});
+    if (!id) refuse_cursor();
     after = MissionId{id.value()};
   }
   Page page;
@@ -246,6 +261,7 @@ Response items(ExchangeApi& s, const Request& request) {
   const auto query =
       ogc_items_query(request, collection.usual_limit, collection.max_limit, collection.has_heights);
   if (collection.id == "tracks") return page_answer(request, collection, query, track_page(s, query));
+  if (collection.id == "anchors") return page_answer(request, collection, query, anchor_page(s, query));
   return page_answer(request, collection, query, page_of(items_of(s, collection), query));
 }
 

@@ -8,6 +8,7 @@
 #include <set>
 
 #include "api/formats/names_alike.hpp"
+#include "api/learning/split_leak.hpp"
 #include "core/base/to_wire.hpp"
 #include "core/ml/dataset.hpp"
 #include "core/ml/random.hpp"
@@ -165,23 +166,6 @@ std::vector<std::string> shared(const std::set<std::string>& a, const std::set<s
   return out;
 }
 
-/// Rows of the test part that stand in the training part too, number by number.
-std::size_t copies(const DatasetTable& table) {
-  const auto key = [](const DatasetRow& row) {
-    std::vector<double> values;
-    for (std::size_t f = 0; f < k_feature_count; ++f)
-      if (row.features.present.test(f)) values.push_back(row.features.values[f]);
-    values.push_back(row.true_range_m.value_or(-1));
-    return values;
-  };
-  std::set<std::vector<double>> trained;
-  for (const auto& row : table.rows)
-    if (!row.test) trained.insert(key(row));
-  return static_cast<std::size_t>(std::count_if(table.rows.begin(), table.rows.end(), [&](const auto& row) {
-    return row.test && trained.contains(key(row));
-  }));
-}
-
 std::string split_report_json(const DatasetTable& table, Place split_by,
                               const std::map<std::string, std::size_t>& dropped) {
   Part train, test;
@@ -191,6 +175,10 @@ std::string split_report_json(const DatasetTable& table, Place split_by,
              settings = shared(train.settings, test.settings);
   const auto duplicates = copies(table);
   Ordered warnings = Ordered::array();
+  if (duplicates > 0)
+    warnings.push_back(std::to_string(duplicates) +
+                       " held-out rows stand in the training part too, number by number: figures on them "
+                       "promise too much, and the gate of models leaves them out");
   if (test.rows == 0) warnings.push_back("no part is held out: the figures come from cross-validation only");
   if (!campaigns.empty())
     warnings.push_back("train and test have a campaign in common: the same radios, perhaps the same day");

@@ -3,7 +3,11 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <memory>
+#include <set>
 
+#include "api/learning/gate_together.hpp"
+#include "api/learning/split_leak.hpp"
 #include "core/ml/evaluate.hpp"
 #include "core/ml/plausible.hpp"
 
@@ -12,10 +16,14 @@ namespace {
 
 /// The same figure twice may differ in its last digit.
 constexpr double k_slack = 1e-9;
+/// Of a Gaussian 0.95; errors of radios have heavier tails, and places differ.
+constexpr double k_least_within95 = 0.8;
 
 struct Figures {
   std::optional<double> accuracy{}, fpr{}, mae_m{}, mae_raw_m{};
+  std::optional<double> balanced{};   ///< accuracy: mean of both classes' own; 0.5 is chance
   std::optional<double> commonest{};  ///< share of the more frequent class: what always saying it would reach
+  std::optional<double> within95{};   ///< share of the errors within 1.96 of the sigmas claimed
 };
 
 std::optional<double> metric(const ml::Model& model, std::string_view name) {
@@ -25,8 +33,13 @@ std::optional<double> metric(const ml::Model& model, std::string_view name) {
 }
 
 Figures manifest_figures(const ml::Model& model) {
-  return {metric(model, "accuracy"), metric(model, "fpr"), metric(model, "mae_m"), metric(model, "mae_raw_m"),
-          std::nullopt};
+  Figures out;
+  out.accuracy = metric(model, "accuracy");
+  out.fpr = metric(model, "fpr");
+  out.mae_m = metric(model, "mae_m");
+  out.mae_raw_m = metric(model, "mae_raw_m");
+  out.balanced = metric(model, "balanced_accuracy");
+  return out;
 }
 
 Figures figures_on(const ml::Model& model, const ml::Dataset& rows) {
@@ -40,11 +53,13 @@ Figures figures_on(const ml::Model& model, const ml::Dataset& rows) {
     if (e.confusion->fp + e.confusion->tn > 0) out.fpr = e.confusion->fpr();
     const auto los = static_cast<double>(e.confusion->tp + e.confusion->fn),
                nlos = static_cast<double>(e.confusion->fp + e.confusion->tn);
+    if (los > 0 && nlos > 0) out.balanced = e.confusion->balanced_accuracy();
     if (los + nlos > 0) out.commonest = std::max(los, nlos) / (los + nlos);
   }
   if (e.all) {
     out.mae_m = e.all->corrected.mae_m;
     out.mae_raw_m = e.all->raw.mae_m;
+    out.within95 = e.within95;
   }
   return out;
 }
@@ -56,13 +71,18 @@ struct Compared {
 enum class Side : std::uint8_t { test, train };
 
 /// Both on the rows that have what either needs; nothing where there are too few of them.
+/// learned  rows that the candidate has seen elsewhere
 std::optional<Compared> measured(const ml::Model& candidate, const ml::Model* current, const GateRows& on,
-                                 Side side = Side::test) {
+                                 Side side = Side::test, const std::set<std::vector<double>>& learned = {}) {
   if (on.table == nullptr) return std::nullopt;
   DatasetTable test;
   test.registers = on.table->registers;
+  // A held-out row that stands among the trained ones too, number by number, is not held out.
+  const auto trained = side == Side::test ? trained_numbers(*on.table) : std::set<std::vector<double>>{};
   for (const auto& row : on.table->rows)
-    if (row.test == (side == Side::test) && row.repeats == 1) test.rows.push_back(row);
+    if (row.test == (side == Side::test) && row.repeats == 1 && !trained.contains(numbers_of(row)) &&
+        !learned.contains(numbers_of(row)))
+      test.rows.push_back(row);
   if (test.rows.empty()) return std::nullopt;
   const auto task = candidate.info.task;
   LearningWish wish{candidate.info.features, task != ml::Task::bias, task != ml::Task::nlos_id, {}, {}};
@@ -107,6 +127,39 @@ class Checks {
     if (b && *a > *b + k_slack)
       fail(std::move(check), std::string(name) + " " + figure(*a) + " is worse than the " + figure(*b) +
                                  " of the active model" + where);
+    else
+      out.checks.push_back(std::move(check));
+  }
+  /// Beside chance, where both classes are there: what is wrong more often than a coin is no identification.
+  void better_than_chance(const Figures& mine, const std::string& basis, const std::string& where) {
+    if (!mine.balanced) return;
+    GateCheck check{"helps", mine.balanced, 0.5, true, basis};
+    if (*mine.balanced < 0.5 + k_slack)
+      fail(std::move(check),
+           "balanced accuracy " + figure(*mine.balanced) + where + " is no better than chance");
+    else
+      out.checks.push_back(std::move(check));
+  }
+  /// Beside no correction.
+  void corrects(const Figures& mine, const std::string& basis, const std::string& where) {
+    GateCheck check{"helps", mine.mae_m, mine.mae_raw_m, true, basis};
+    if (!mine.mae_m || !mine.mae_raw_m)
+      fail(std::move(check),
+           "nothing shows that the correction helps in places that were not used in training");
+    else if (*mine.mae_m > *mine.mae_raw_m - k_slack)
+      fail(std::move(check), "MAE " + figure(*mine.mae_m) + " m" + where + " is no better than the " +
+                                 figure(*mine.mae_raw_m) + " m without a correction");
+    else
+      out.checks.push_back(std::move(check));
+  }
+  /// A sigma that is too small makes every region it goes into too small.
+  void honest_sigma(const Figures& mine, const std::string& basis) {
+    if (!mine.within95) return;
+    GateCheck check{"sigma", mine.within95, k_least_within95, true, basis};
+    if (*mine.within95 < k_least_within95)
+      fail(std::move(check), "only " + figure(*mine.within95) +
+                                 " of the errors are within 1.96 of the sigmas that it claims, where 0.95 "
+                                 "should be: the regions of anchors would be too small");
     else
       out.checks.push_back(std::move(check));
   }
@@ -161,9 +214,11 @@ void check_active_places(const ml::Model& candidate, const ml::Model* current, c
                          Checks& checks) {
   if (!data.active.asked || current == nullptr) return;
   const std::string basis = "active_places", where = " on the places of the active model";
-  auto both = measured(candidate, current, {data.active.table, basis, 1});
+  const auto learned = data.own != nullptr ? trained_numbers(*data.own) : std::set<std::vector<double>>{};
+  auto both =
+      measured(candidate, current, {data.active.table, basis, k_least_kept_rows}, Side::test, learned);
   if (!both && data.active.believe_manifest) {
-    both = measured(candidate, current, {data.active.table, basis, k_least_kept_rows}, Side::train);
+    both = measured(candidate, current, {data.active.table, basis, k_least_kept_rows}, Side::train, learned);
     if (both) both->current = manifest_figures(*current);
   }
   const bool classes = candidate.info.task == ml::Task::nlos_id;
@@ -174,8 +229,8 @@ void check_active_places(const ml::Model& candidate, const ml::Model* current, c
         "nothing shows how it does on the places of the active model: " +
             std::string(data.active.table == nullptr
                             ? "the data that one was trained on are not kept here"
-                            : "its data have no single ranges with the features of both models, or of one "
-                              "class alone") +
+                            : "its data have no ten single ranges with the features of both models that this "
+                              "one was not trained on, or of one class alone") +
             "; freeze a data set that has them and train on it, or promote it with a reason");
   if (!classes) return checks.no_worse("mae_m", both->candidate.mae_m, both->current.mae_m, basis, where);
   checks.no_worse("fpr", both->candidate.fpr, both->current.fpr, basis, where);
@@ -183,6 +238,60 @@ void check_active_places(const ml::Model& candidate, const ml::Model* current, c
   if (both->candidate.commonest && both->current.accuracy &&
       *both->current.accuracy > *both->candidate.commonest)
     checks.helps(both->candidate, basis, where);
+}
+
+/// So much worse may corrections be by chance.
+constexpr double k_most_harm_m = 0.01;
+
+/// The active corrections with the candidate's classes in place of those they have now.
+void check_together(const ml::Model& candidate, const GateData& data, Checks& checks) {
+  if (candidate.info.task != ml::Task::nlos_id) return;
+  ml::ModelSet after = data.beside;
+  after.nlos_id = std::make_shared<const ml::Model>(candidate);
+  for (const auto& on : data.rows) {
+    if (on.table == nullptr) continue;
+    const auto both = corrected_together(data.beside, after, data.correction, *on.table,
+                                         std::max<std::size_t>(on.least_rows, 1));
+    if (!both) continue;
+    GateCheck check{"with_corrections", both->mae_m, both->mae_before_m, true, on.basis};
+    if (both->mae_m > both->mae_before_m + k_most_harm_m)
+      checks.fail(std::move(check), "with its classes the active corrections leave " + figure(both->mae_m) +
+                                        " m, and without it " + figure(both->mae_before_m) + " m");
+    else
+      checks.out.checks.push_back(std::move(check));
+    return;
+  }
+}
+
+struct Basis {
+  std::string name;
+  bool believe_manifest{};
+};
+
+/// What the candidate does where it was measured, and, of models made here, what cross-validation says of
+/// it: a held-out part that is easy, or nearly that of the training, does not hide that.
+void check_figures(const ml::Model& candidate, const Figures& mine, const Figures& theirs, const Basis& basis,
+                   Checks& checks) {
+  const bool folds_too = basis.believe_manifest && basis.name != "manifest";
+  const Figures folds = folds_too ? manifest_figures(candidate) : Figures{};
+  const std::string in_folds = " in cross-validation";
+  if (candidate.info.task != ml::Task::nlos_id) {
+    checks.no_worse("mae_m", mine.mae_m, theirs.mae_m, basis.name, "");
+    checks.corrects(mine, basis.name, "");
+    if (folds.mae_m && folds.mae_raw_m) checks.corrects(folds, "manifest", in_folds);
+    checks.honest_sigma(mine, basis.name);
+    return;
+  }
+  checks.no_worse("fpr", mine.fpr, theirs.fpr, basis.name, "");
+  // One that calls everything NLOS is never wrong about NLOS.
+  const bool beaten = theirs.accuracy && mine.commonest && *theirs.accuracy > *mine.commonest;
+  if (mine.commonest && (!basis.believe_manifest || beaten))
+    checks.helps(mine, basis.name, "");
+  else
+    checks.better_than_chance(mine, basis.name, "");
+  checks.better_than_chance(folds, "manifest", in_folds);
+  if (mine.accuracy)
+    checks.out.checks.push_back({"accuracy", mine.accuracy, theirs.accuracy, true, basis.name});
 }
 
 }  // namespace
@@ -224,24 +333,10 @@ GateReport gate_of(const ml::Model& candidate, const ml::Model* current, const G
     check_active_places(candidate, current, data, checks);
     return checks.out;
   }
-  if (candidate.info.task == ml::Task::nlos_id) {
-    checks.no_worse("fpr", mine.fpr, theirs.fpr, basis, "");
-    if (mine.commonest && !data.believe_manifest) checks.helps(mine, basis, "");
-    if (mine.accuracy) checks.out.checks.push_back({"accuracy", mine.accuracy, theirs.accuracy, true, basis});
-  } else {
-    checks.no_worse("mae_m", mine.mae_m, theirs.mae_m, basis, "");
-    GateCheck helps{"helps", mine.mae_m, mine.mae_raw_m, true, basis};
-    if (!mine.mae_m || !mine.mae_raw_m)
-      checks.fail(std::move(helps),
-                  "nothing shows that the correction helps in places that were not used in training");
-    else if (*mine.mae_m > *mine.mae_raw_m - k_slack)
-      checks.fail(std::move(helps), "MAE " + figure(*mine.mae_m) + " m is no better than the " +
-                                        figure(*mine.mae_raw_m) + " m without a correction");
-    else
-      checks.out.checks.push_back(std::move(helps));
-  }
+  check_figures(candidate, mine, theirs, {basis, data.believe_manifest}, checks);
   check_plausible(candidate, data, checks);
   check_active_places(candidate, current, data, checks);
+  check_together(candidate, data, checks);
   return checks.out;
 }
 

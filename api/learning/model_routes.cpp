@@ -149,12 +149,18 @@ Ordered active_json(LearningApi& l, const std::shared_ptr<const ModelRegistry::A
                        : model_json(value_or_problem(l.stores.models.model(at->second)), true);
   }
   const bool raw = active->predictor.empty();
+  // As ml::Predictor takes them.
+  const bool two_classes = active->models.contains("nlos_id") && active->models.contains("los_bias") &&
+                           active->models.contains("nlos_bias");
   return {{"models", std::move(models)},
           {"correction", ml::k_correction_words.word(active->correction)},
           {"raw", raw},
           {"note", !active->fault.empty() ? Ordered(active->fault)
                    : raw                  ? Ordered("no model is promoted: ranges are used uncorrected")
-                                          : Ordered(nullptr)}};
+                   : two_classes && active->models.contains("bias")
+                       ? Ordered("the model of bias is not used: nlos_id, los_bias and nlos_bias together "
+                                 "take its place")
+                       : Ordered(nullptr)}};
 }
 
 Response active_answer(LearningApi& l) {
@@ -220,13 +226,16 @@ GateReport gate_report(LearningApi& l, const Standing& now, const ModelSource::A
   const auto model = value_or_problem(read_model_artifact(candidate.text));
   const auto current = active_model(l, now, candidate.stored.task);
   GateData data;
+  const auto in_use = l.models.active();
+  data.beside = in_use->predictor.models();
+  data.correction = in_use->correction;
   data.believe_manifest = candidate.standing == ModelStanding::made;
   DatasetTable own;
   if (data.believe_manifest && candidate.stored.run) {
     const auto run = value_or_problem(l.stores.runs.run(*candidate.stored.run));
     if (auto parsed = DatasetTable::parse(value_or_problem(l.stores.datasets.csv(run.dataset)))) {
       own = std::move(parsed).value();
-      data.rows.push_back({&own, "held_out", 1});
+      data.rows.push_back({&own, "held_out", k_least_kept_rows});
       data.own = &own;
     }
   }

@@ -24,7 +24,7 @@ Ordered rates_json(const ml::Confusion& c) {
           {"confusion", confusion_json(c)}};
 }
 
-struct Spread {
+struct FoldSpread {
   double sum{}, square{};
   std::size_t n{};
   void add(double v) {
@@ -70,7 +70,7 @@ Ordered candidate_json(const ml::TrainingOutcome& o, std::size_t index, bool bia
 
 /// Mean and sd over the folds, as tables of chapter 6 have them.
 Ordered cv_json(const ml::TrainingOutcome& o, std::size_t index, bool bias) {
-  Spread loss, accuracy, fpr, mae;
+  FoldSpread loss, accuracy, fpr, mae;
   for (const auto& fold : o.folds) {
     if (fold.candidate != index) continue;
     loss.add(fold.loss);

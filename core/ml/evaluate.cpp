@@ -6,6 +6,8 @@
 namespace anchord::ml {
 namespace {
 
+constexpr double k_sigmas95 = 1.959963984540054;
+
 BiasEvaluation bias_of(const std::vector<double>& raw, const std::vector<double>& left,
                        const std::vector<std::size_t>& rows) {
   std::vector<double> a, b;
@@ -33,12 +35,15 @@ Evaluation evaluate(const Model& model, const Dataset& given) {
   out.rows = data.rows();
   std::vector<double> p_los, left;
   double nll = 0;
+  std::size_t n_claimed = 0, n_within = 0;
   for (std::size_t i = 0; i < data.rows(); ++i) {
     const auto prediction = predict(model, data.row(i));
     if (prediction.p_los) p_los.push_back(*prediction.p_los);
     if (prediction.bias_m && data.has_truth()) {
       left.push_back(data.bias_m[i] - *prediction.bias_m);
       nll -= log_density(model, data.row(i), data.bias_m[i]).value_or(0);
+      n_claimed += prediction.sigma_m ? 1 : 0;
+      n_within += prediction.sigma_m && std::abs(left.back()) <= k_sigmas95 * *prediction.sigma_m ? 1 : 0;
     }
   }
   const bool classes = data.labelled() && !p_los.empty() && p_los.size() == data.rows();
@@ -59,6 +64,7 @@ Evaluation evaluate(const Model& model, const Dataset& given) {
       if (const auto rows = rows_where(data, 0); !rows.empty()) out.nlos = bias_of(data.bias_m, left, rows);
     }
     out.nll = nll / static_cast<double>(data.rows());
+    if (n_claimed > 0) out.within95 = static_cast<double>(n_within) / static_cast<double>(n_claimed);
     out.cdf_raw = cdf_of_magnitude(data.bias_m);
     out.cdf_corrected = cdf_of_magnitude(left);
   }

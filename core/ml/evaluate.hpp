@@ -28,7 +28,8 @@ struct Evaluation {
   std::optional<Confusion> confusion{};  ///< with the model's threshold
   double brier{}, log_loss{}, roc_auc{};
   std::optional<BiasEvaluation> all{}, los{}, nlos{};
-  std::optional<double> nll{};  ///< mean negative log-likelihood of the bias
+  std::optional<double> nll{};       ///< mean negative log-likelihood of the bias
+  std::optional<double> within95{};  ///< share of the biases within 1.96 of the sigmas claimed for them
   std::vector<RocPoint> roc{};
   std::vector<CdfPoint> cdf_raw{}, cdf_corrected{};
   std::vector<PlaceEvaluation> places{};

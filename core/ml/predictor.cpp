@@ -132,7 +132,8 @@ void Predictor::correct(const nlos::FeatureVector& features, Correction how, Ran
   } else if (los && !nlos_bias_.model) {
     out.spoke.set(bit(Task::los_bias));
     out.bias_m = out.p_los ? *out.p_los * los->bias_m : los->bias_m;
-    out.sigma_m = los->sigma_m;
+    // What a range that is not called LOS is off by, no model here knows.
+    if (out.los.value_or(false)) out.sigma_m = los->sigma_m;
     far = los->far;
   }
   if (far) out.withheld = Withheld::far_features;

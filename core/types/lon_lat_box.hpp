@@ -1,5 +1,7 @@
 #pragma once
 
+#include <cmath>
+
 #include "core/types/position.hpp"
 
 namespace anchord {
@@ -16,5 +18,15 @@ struct LonLatBox {
     return along && of.north >= south && of.south <= north;
   }
 };
+
+/// As it is asked for: also over the antimeridian with an east beyond 180 degrees (170 to 190) or a west
+/// beyond -180, as many clients write it.
+inline LonLatBox lon_lat_box(double west, double south, double east, double north) {
+  if (east - west >= 360.0) return {-180, south, 180, north};
+  const auto turned = [](double lon_deg) {
+    return std::abs(lon_deg) <= 180.0 ? lon_deg : std::remainder(lon_deg, 360.0);
+  };
+  return {turned(west), south, turned(east), north};
+}
 
 }  // namespace anchord

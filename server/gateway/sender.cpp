@@ -28,6 +28,8 @@ constexpr milliseconds k_first_busy_pause{1'000}, k_longest_busy_pause{30'000}; 
 constexpr std::uint64_t k_least_piece{4u << 10}, k_first_piece{8u << 10}, k_most_piece{256u << 10};
 constexpr double k_piece_s = 1.0;  ///< of the link: so long may live rows wait for the backlog
 constexpr std::uint64_t k_rate_from_bytes{2u << 10};  ///< smaller requests measure the delay, not the rate
+constexpr double k_delay_rise = 0.5;     ///< of the way to a longer delay; a shorter one counts at once
+constexpr double k_least_sending = 0.1;  ///< of what a request took: so much at least was sending, not delay
 constexpr milliseconds k_ask_idle{1'000}, k_ask_recording{5'000}, k_ask_forbidden{30'000};
 constexpr milliseconds k_hold_time{60'000};
 constexpr milliseconds k_note_every{60'000};
@@ -314,6 +316,7 @@ class Sender::Impl {
     }
     std::map<std::string, std::string> headers;
     if (!token_.empty()) headers.emplace("Authorization", "Bearer " + token_);
+    const auto began = Monotonic::now();
     // On the networks of a field anybody may answer.
     auto answer = client_.call({.method = method,
                                 .target = target,
@@ -321,23 +324,27 @@ class Sender::Impl {
                                 .content_type = type.empty() ? "application/json" : type,
                                 .headers = std::move(headers),
                                 .most_bytes = k_most_answer_bytes});
+    took_s_ = std::max(1e-4, std::chrono::duration<double>(Monotonic::now() - began).count());
+    if (answer && body.size() < k_rate_from_bytes)
+      delay_s_ =
+          delay_s_ == 0 || took_s_ < delay_s_ ? took_s_ : delay_s_ + k_delay_rise * (took_s_ - delay_s_);
     update([](auto& s) { ++s.requests; });
     return answer;
   }
 
   Result<server::ClientResponse> post(const std::string& target, std::string_view type,
                                       const std::string& body) {
-    const auto began = Monotonic::now();
     auto answer = call("POST", target, body, type);
     if (!answer) return answer;
-    const double took_s = std::max(1e-4, std::chrono::duration<double>(Monotonic::now() - began).count());
     auto status = status_.lock();
     status->bytes_sent += body.size();
     if (body.size() < k_rate_from_bytes || answer.value().status >= 300) return answer;
-    const double rate = static_cast<double>(body.size()) / took_s;
+    // A link with a long delay is not a slow one: pieces that shrank with the delay would never fill it.
+    const double sending_s = std::max(took_s_ - delay_s_, k_least_sending * took_s_);
+    const double rate = static_cast<double>(body.size()) / sending_s;
     status->bytes_per_s = status->bytes_per_s == 0 ? rate : 0.5 * (status->bytes_per_s + rate);
-    piece_ = std::clamp(static_cast<std::uint64_t>(status->bytes_per_s * k_piece_s), k_least_piece,
-                        std::min(k_most_piece, 2 * std::max(piece_, k_first_piece)));
+    piece_ = std::clamp(static_cast<std::uint64_t>(status->bytes_per_s * std::max(k_piece_s, delay_s_)),
+                        k_least_piece, std::min(k_most_piece, 2 * std::max(piece_, k_first_piece)));
     return answer;
   }
 
@@ -367,6 +374,7 @@ class Sender::Impl {
   // Of the sending thread.
   std::int64_t frontier_{0};  ///< what came later is live
   std::uint64_t piece_{k_first_piece};
+  double took_s_{0}, delay_s_{0};  ///< the last request; one without a body to speak of
   Pauses lost_{k_first_pause, k_longest_pause}, busy_{k_first_busy_pause, k_longest_busy_pause};
   std::map<MissionId, Monotonic::time_point> held_until_;
   Monotonic::time_point ask_at_{}, note_at_{};

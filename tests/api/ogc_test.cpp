@@ -77,13 +77,62 @@ TEST_F(Ogc, PagesShowEachFeatureOnce) {
   EXPECT_EQ(first["numberMatched"], 2);
   ASSERT_EQ(first["links"].size(), 2U);
   EXPECT_EQ(first["links"][1]["rel"], "next");
-  EXPECT_EQ(first["links"][1]["href"], "/ogc/collections/anchors/items?limit=1&cursor=0x6a3c");
-  const Json second = items("anchors", {{"limit", "1"}, {"cursor", "0x6a3c"}});
+  EXPECT_EQ(first["links"][1]["href"], "/ogc/collections/anchors/items?limit=1&cursor=0x6a3c.1");
+  const Json second = items("anchors", {{"limit", "1"}, {"cursor", "0x6a3c.1"}});
   EXPECT_EQ(anchors(first), Names{"0x6a2f"});
   EXPECT_EQ(anchors(second), Names{"0x6a3c"});
   EXPECT_EQ(second["links"].size(), 1U);
   EXPECT_EQ(items("anchors", {{"limit", "1000000"}})["numberReturned"], 2)
       << "the maximum, as the standard has it";
+}
+
+TEST_F(Ogc, PagesAreOfTheRevisionOfTheFirstWhateverIsPublishedBetween) {
+  publish();
+  const Json first = items("anchors", {{"limit", "1"}}),
+             native = json(get("/api/v1/anchors", {{"limit", "1"}}));
+  publish();
+  const Json rest = items("anchors", {{"limit", "1"}, {"cursor", "0x6a3c.1"}});
+  EXPECT_EQ(first["features"][0]["properties"]["revision"], 1);
+  EXPECT_EQ(rest["features"][0]["properties"]["revision"], 1);
+  EXPECT_EQ(native["next_cursor"], "0x6a2f.1");
+  const Json next = json(get("/api/v1/anchors", {{"limit", "1"}, {"cursor", native["next_cursor"]}}));
+  EXPECT_EQ(next["revision"], 1);
+  EXPECT_EQ(next["features"][0]["properties"]["network_id"], "0x6a3c");
+  EXPECT_EQ(json(get("/api/v1/anchors"))["revision"], 2);
+  for (const char* cursor : {"0x6a3c.3", "0x6a3c.x", "0x6a3c.", "0x6a3c.0", "x.1"})
+    items("anchors", {{"cursor", cursor}}, 400);
+  // A cursor of before has no revision, and goes on in the newest.
+  EXPECT_EQ(anchors(items("anchors", {{"cursor", "0x6a3c"}})), Names{"0x6a3c"});
+}
+
+TEST_F(Ogc, ABoxBeyond180DegreesIsTheSameOverTheAntimeridian) {
+  publish();
+  for (const char* box : {"170,-20,190,-10", "-190,-20,-170,-10", "179,-18,181,-17", "-200,-90,400,0"}) {
+    EXPECT_EQ(anchors(items("anchors", {{"bbox", box}})), Names{"0x6a3c"}) << box;
+    EXPECT_EQ(anchors(json(get("/api/v1/anchors", {{"bbox", box}}))), Names{"0x6a3c"}) << box;
+  }
+  EXPECT_EQ(anchors(items("anchors", {{"bbox", "-180.00015,-90,180,90"}})), (Names{"0x6a2f", "0x6a3c"}));
+  EXPECT_EQ(items("anchors", {{"bbox", "180.5,-20,190,-10"}})["numberMatched"], 0);
+}
+
+TEST_F(Ogc, ATimeMayHaveAnOffset) {
+  publish();
+  const std::string when = items("anchors")["features"][0]["properties"]["calibrated_at"];
+  const auto at = parse_rfc3339(when).value();
+  // From a second before to a second after, so many hours later by the clock on the wall.
+  const auto shifted = [&](int hours, const std::string& offset) {
+    const auto wall = [&](int seconds) {
+      auto text = to_rfc3339(UtcTime{at.ns + std::int64_t{1'000'000'000} * (3600 * hours + seconds)});
+      text.pop_back();
+      return text + offset;
+    };
+    return wall(-1) + "/" + wall(1);
+  };
+  EXPECT_EQ(items("anchors", {{"datetime", shifted(2, "+02:00")}})["numberMatched"], 2);
+  EXPECT_EQ(items("anchors", {{"datetime", shifted(-3, "-03:00")}})["numberMatched"], 2);
+  EXPECT_EQ(items("anchors", {{"datetime", shifted(0, "+02:00")}})["numberMatched"], 0);
+  items("anchors", {{"datetime", shifted(0, "+2:00")}}, 400);
+  items("anchors", {{"datetime", shifted(0, "+25:00")}}, 400);
 }
 
 TEST_F(Ogc, LinksAreAbsoluteAndSayHowAProxyWasAsked) {

@@ -76,6 +76,7 @@ const mapping = {
 /** The way to a server: `bytesPerS` each way (0: as fast as it goes); up, cut (nobody answers the door) or silent (nothing comes through). */
 export class LinkProxy {
   bytesPerS = 0;
+  delayMs = 0; // each way, of a link that has room for everything
   toServer = 0; // bytes
   toClient = 0;
   #pairs = new Set();
@@ -123,7 +124,8 @@ export class LinkProxy {
     from.on('data', (bytes) => {
       count(bytes.length);
       if (this.bytesPerS === 0) {
-        to.write(bytes);
+        if (this.delayMs === 0) to.write(bytes);
+        else setTimeout(() => to.destroyed || to.write(bytes), this.delayMs);
         return;
       }
       from.pause();

@@ -83,6 +83,32 @@ test('a link that swallows everything is noticed, and live is back within 10 s',
     await everyRowOnce(server, mission, feeder);
   }));
 
+test('a link whose answers take two seconds is filled all the same: what waits goes, and more rows than come', (t) =>
+  rig(async ({ server, feeder, proxy, gateway }) => {
+    const mission = await recordingMission(server);
+    await gateway.start();
+    await recordsInto(gateway, mission);
+    await eventually('the tag is there', () => feeder.connected);
+    feeder.run(100);
+    await eventually('rows arrive', async () => (await storedCount(server, mission)) > 0);
+    await proxy.cut();
+    await sleep(8_000);
+    proxy.delayMs = 1_000;
+    await proxy.restore();
+    const waiting = (await gateway.status()).outbox.rows;
+    t.diagnostic(`${waiting} rows wait`);
+    assert.ok(waiting > 500, `${waiting}`);
+    // In the time of one round trip 200 more come, and those that are on their way wait for their answer.
+    await eventually('the backlog has gone', async () => (await gateway.status()).outbox.rows < 500, 45_000, 250);
+    await sleep(6_000);
+    const { rows } = (await gateway.status()).outbox;
+    assert.ok(rows < 900, `${rows} rows wait again`);
+    proxy.delayMs = 0;
+    feeder.pause();
+    await drained(gateway);
+    await everyRowOnce(server, mission, feeder);
+  }));
+
 test('kill -9 at random instants loses no row that was kept and stores none twice', (t) =>
   rig(async ({ server, feeder, proxy, gateway }) => {
     const mission = await recordingMission(server);

@@ -12,6 +12,25 @@ afterEach(() => {
   me.value = undefined;
 });
 
+describe('who we are', () => {
+  const ours = { name: 'crew', roles: ['operator'], token_id: 't', sites: null, auth: 'on' };
+  const says = (text: string, status: number): void => {
+    vi.stubGlobal('fetch', () => Promise.resolve(new Response(text, { status })));
+  };
+  it('is kept where a guest network answers with its own page, and forgotten where the server says so', async () => {
+    answer(ours);
+    await refresh_me();
+    for (const status of [200, 401, 403, 511]) {
+      says('<html>Welcome to our guest network</html>', status);
+      await refresh_me();
+      expect(me.value?.name, `${status}`).toBe('crew');
+    }
+    says(JSON.stringify({ type: '/problems/unauthorized', title: 'Unauthorized', status: 401 }), 401);
+    await refresh_me();
+    expect(me.value).toBeNull();
+  });
+});
+
 describe('whether the tools of the whole server are shown', () => {
   it('hides them from a token that is bound to sites, and shows them to any other', async () => {
     expect(of_every_site.value).toBe(true);

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <memory>
 
 #include "api/learning/model_registry.hpp"
 #include "api/learning/range_features.hpp"
@@ -167,6 +168,129 @@ TEST(ModelGate, SaysWhereNothingTellsHowACandidateDoesOnThePlacesOfTheActiveMode
                               {{{&rows, "held_out", 1}}, true, nullptr, {true, nullptr, true}});
   EXPECT_FALSE(report.passed);
   EXPECT_NE(report.why.find("the data that one was trained on are not kept here"), std::string::npos)
+      << report.why;
+}
+
+/// P(LOS) by the first-path level alone, rising with it where `slope` is positive.
+ml::Model identification(double slope, double balanced_accuracy) {
+  ml::Model m;
+  m.info.task = ml::Task::nlos_id;
+  m.info.features = {"fp_dbm"};
+  m.info.data_digest = "a";
+  m.info.metrics = {{"balanced_accuracy", balanced_accuracy}, {"fpr", 1 - balanced_accuracy}};
+  m.classifier.emplace();
+  m.classifier->scaler = {{-85.0}, {5.0}, 0};
+  m.classifier->members = {{ml::Linear{{slope}, 0}}};
+  return m;
+}
+/// NLOS ranges are 10 dB weaker; `n_los` and `n_nlos` of them.
+DatasetTable weaker_behind_walls(std::size_t n_los, std::size_t n_nlos) {
+  auto out = long_by(0.1, n_los + n_nlos, 1);
+  for (std::size_t i = 0; i < out.rows.size(); ++i) {
+    out.rows[i].los = i < n_los;
+    out.rows[i].features.set(Feature::fp_dbm, i < n_los ? -80 : -90);
+  }
+  return out;
+}
+
+TEST(ModelGate, RefusesAnIdentificationOfItsOwnThatIsWrongMoreOftenThanACoin) {
+  const auto rows = weaker_behind_walls(15, 15);
+  const GateData data{{{&rows, "held_out", 10}}, true};
+  EXPECT_TRUE(gate_of(identification(4, 0.99), nullptr, data).passed);
+  const auto inverted = gate_of(identification(-4, 0.99), nullptr, data);
+  EXPECT_FALSE(inverted.passed);
+  EXPECT_NE(inverted.why.find("balanced accuracy 0.0000 is no better than chance"), std::string::npos)
+      << inverted.why;
+  const auto lucky = gate_of(identification(4, 0.4), nullptr, data);
+  EXPECT_FALSE(lucky.passed) << "its own cross-validation says so";
+  EXPECT_NE(lucky.why.find("0.4000 in cross-validation"), std::string::npos) << lucky.why;
+}
+
+// Calls everything NLOS but one range in twelve: never wrong about NLOS, and of no use.
+TEST(ModelGate, RefusesAnIdentificationThatGivesUpWhatTheActiveOneKnows) {
+  auto rows = weaker_behind_walls(24, 12);
+  rows.rows[0].features.set(Feature::fp_dbm, -60);
+  rows.rows[1].features.set(Feature::fp_dbm, -60);
+  auto timid = identification(4, 0.6);
+  timid.classifier->offset = -15;
+  const auto active = identification(4, 0.99);
+  const auto report = gate_of(timid, &active, {{{&rows, "held_out", 10}}, true});
+  EXPECT_FALSE(report.passed);
+  EXPECT_NE(report.why.find("of always predicting the same class"), std::string::npos) << report.why;
+}
+
+TEST(ModelGate, AnEasyHeldOutPartDoesNotHideWhatCrossValidationSays) {
+  const auto rows = long_by_ten_centimetres(20, 1);
+  const auto report = gate_of(correction(0.1, "a", 0.35), nullptr, {{{&rows, "held_out", 10}}, true});
+  EXPECT_FALSE(report.passed);
+  EXPECT_NE(report.why.find("MAE 0.3500 m in cross-validation is no better than the 0.2000 m"),
+            std::string::npos)
+      << report.why;
+}
+
+TEST(ModelGate, RowsOfTheTrainingPartJudgeNobodyUnderAnotherName) {
+  auto both = long_by_ten_centimetres(20, 1);
+  auto trained = long_by(0.10, 15, 1, false);
+  for (auto& row : trained.rows) row.environment = "another room";
+  both.rows.insert(both.rows.end(), trained.rows.begin(), trained.rows.end());
+  EXPECT_EQ(gate_of(correction(0.09, "a", 0.03), nullptr, {{{&both, "held_out", 5}}, true}).checks[0].basis,
+            "held_out");
+  EXPECT_EQ(gate_of(correction(0.09, "a", 0.03), nullptr, {{{&both, "held_out", 6}}, true}).checks[0].basis,
+            "manifest");
+}
+
+TEST(ModelGate, RefusesACorrectionWhoseSigmaIsFarTooSmall) {
+  const auto rows = long_by_ten_centimetres(20, 1);
+  auto candidate = correction(0.09, "a", 0.03);
+  candidate.regressor->sigma_m = 0.01;
+  EXPECT_TRUE(gate_of(candidate, nullptr, {{{&rows, "kept_data", 10}}, false}).passed);
+  candidate.regressor->sigma_m = 1e-4;
+  const auto report = gate_of(candidate, nullptr, {{{&rows, "kept_data", 10}}, false});
+  EXPECT_FALSE(report.passed);
+  EXPECT_NE(report.why.find("only 0.0000 of the errors are within 1.96 of the sigmas"), std::string::npos)
+      << report.why;
+}
+
+// NLOS ranges are 0.6 m late and LOS ones 0.1 m: a correction by the class halves nothing if the classes are
+// exchanged.
+TEST(ModelGate, RefusesAnIdentificationThatMakesTheActiveCorrectionsWorse) {
+  auto rows = weaker_behind_walls(20, 20);
+  for (auto& row : rows.rows) row.features.set(Feature::range_m, *row.true_range_m + (*row.los ? 0.1 : 0.6));
+  auto los = correction(0.1, "l", 0.02), nlos = correction(0.6, "n", 0.02);
+  nlos.info.task = ml::Task::nlos_bias;
+  for (auto* model : {&los, &nlos}) model->regressor->scaler = {{20.0}, {20.0}, 0};  // the ranges are not far
+  const auto right = identification(4, 0.99);
+  GateData data{{{&rows, "held_out", 10}}, true};
+  data.beside.nlos_id = std::make_shared<const ml::Model>(right);
+  data.beside.los_bias = std::make_shared<const ml::Model>(los);
+  data.beside.nlos_bias = std::make_shared<const ml::Model>(nlos);
+  const auto together = [](const GateReport& report) {
+    const auto at = std::ranges::find(report.checks, "with_corrections", &GateCheck::name);
+    return at == report.checks.end() ? nullptr : &*at;
+  };
+  const auto same = gate_of(right, nullptr, data);
+  ASSERT_NE(together(same), nullptr);
+  EXPECT_TRUE(same.passed) << same.why;
+  const auto exchanged = gate_of(identification(-4, 0.99), nullptr, data);
+  ASSERT_NE(together(exchanged), nullptr);
+  EXPECT_FALSE(together(exchanged)->passed);
+  EXPECT_GT(*together(exchanged)->candidate, 0.4);
+  EXPECT_LT(*together(exchanged)->current, 0.05);
+}
+
+// The places of the active model, learned by heart: what the candidate has seen tells nothing of it.
+TEST(ModelGate, OnThePlacesOfTheActiveModelTheCandidatesOwnTrainingRowsDoNotCount) {
+  const auto home = long_by_ten_centimetres(20, 1);
+  auto own = long_by(0.10, 20, 1, false);
+  const auto fresh = long_by(0.10, 15, 1);
+  own.rows.insert(own.rows.end(), fresh.rows.begin(), fresh.rows.end());
+  for (std::size_t i = 20; i < own.rows.size(); ++i)
+    own.rows[i].features.set(Feature::range_m, own.rows[i].range_m() + 0.001);
+  const auto active = correction(0.08, "home", 0.02);
+  const auto report = gate_of(correction(0.10, "own", 0.01), &active,
+                              {{{&own, "held_out", 10}}, true, &own, {true, &home, true}});
+  EXPECT_FALSE(report.passed);
+  EXPECT_NE(report.why.find("nothing shows how it does on the places of the active model"), std::string::npos)
       << report.why;
 }
 

@@ -115,7 +115,8 @@ async function exchange(method: string, path: string, ask: unknown): Promise<Ans
   try {
     parsed = text ? JSON.parse(text) : null;
   } catch {
-    /* not JSON: the status alone speaks */
+    // A page where JSON was asked for is of somebody on the way, such as the sign-in of a guest network.
+    if (answer.ok) throw new ApiError(problem_of(null, 0));
   }
   if (!answer.ok) throw new ApiError(problem_of(parsed, answer.status), parsed);
   return { body: parsed, etag: answer.headers.get('etag') ?? '' };

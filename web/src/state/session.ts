@@ -29,12 +29,13 @@ function me_of(answer: Unchecked<Wire<'Me'>>): Me | null {
     }
   );
 }
-/// Asks who we are; signed out on 401. Other trouble leaves what is known: a lost link is not a lost session.
+/// Asks who we are; signed out where the server itself says 401. Other trouble leaves what is known: a lost link, or somebody else who answers on
+/// the way, is not a lost session.
 export async function refresh_me(): Promise<void> {
   try {
     me.value = me_of(await get('/me'));
   } catch (e) {
-    if (e instanceof ApiError && (e.problem.status === 401 || e.problem.status === 403)) me.value = null;
+    if (e instanceof ApiError && e.problem.type && [401, 403].includes(e.problem.status)) me.value = null;
   }
 }
 export async function sign_in(token: string): Promise<void> {
