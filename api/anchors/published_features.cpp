@@ -9,6 +9,7 @@
 #include "api/anchors/frame_json.hpp"
 #include "api/anchors/geo_service.hpp"
 #include "api/anchors/routes.hpp"
+#include "api/anchors/site_json.hpp"
 #include "api/kit/current_sites.hpp"
 #include "api/kit/reader.hpp"
 #include "api/kit/support.hpp"
@@ -43,6 +44,11 @@ struct FeatureLookup::State {
   std::optional<GlobeAccuracy> globe(const PublishedPosition& position) {
     if (position.frame != TrackFrame::local) return std::nullopt;
     return globe_accuracy(calibration(position.calibration).provenance, position.estimate.anchor);
+  }
+
+  void set_base_of(const PublishedPosition& position, Site& site) {
+    const Ordered& provenance = calibration(position.calibration).provenance;
+    if (provenance.is_object() && provenance.contains("base")) set_site_base(provenance["base"], site);
   }
 
   /// What its uncertainty comes from; empty where the calibration is of before budgets.
@@ -111,10 +117,11 @@ std::optional<GlobeAccuracy> FeatureLookup::globe(const PublishedPosition& posit
   return state_->globe(position);
 }
 
-AnchorFeature FeatureLookup::feature(Anchor anchor, const PublishedPosition& position,
-                                     std::uint64_t revision) {
+AnchorFeature FeatureLookup::feature(Anchor anchor, const PublishedPosition& position, std::uint64_t revision,
+                                     bool history) {
   AnchorFeature feature;
   feature.site = state_->site(anchor.site);
+  if (history && feature.site) state_->set_base_of(position, *feature.site);
   feature.anchor = std::move(anchor);
   feature.status = feature.anchor.retired ? "retired" : "accepted";
   feature.revision = revision;
@@ -169,7 +176,7 @@ std::vector<AnchorFeature> published_features(AnchorApi& s, std::optional<std::u
   std::vector<AnchorFeature> out;
   for (const auto& position : value_or_problem(s.revisions.published(number))) {
     auto anchor = anchor_as_stored(s, position.estimate.anchor);
-    out.push_back(lookup.feature(std::move(anchor), position, number));
+    out.push_back(lookup.feature(std::move(anchor), position, number, !newest));
     const auto against = contradicted->find(position.estimate.anchor);
     // What an older revision said is history; only the newest is what readers build on.
     if (newest && against != contradicted->end()) contradict(s, out.back(), against->second);

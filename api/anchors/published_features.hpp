@@ -23,8 +23,10 @@ class FeatureLookup {
   std::optional<Site> site(const std::optional<SiteId>& id);
   /// Of a published place that a fitted frame gave.
   std::optional<GlobeAccuracy> globe(const PublishedPosition& position);
-  /// A published position as a feature; `revision` is the one that the reader asked for.
-  AnchorFeature feature(Anchor anchor, const PublishedPosition& position, std::uint64_t revision);
+  /// A published position as a feature; `revision` is the one that the reader asked for. With its site as it
+  /// is now, or, of what is history, with the base and the datum it was calibrated with.
+  AnchorFeature feature(Anchor anchor, const PublishedPosition& position, std::uint64_t revision,
+                        bool history = false);
 
  private:
   struct State;

@@ -141,4 +141,28 @@ void patch_anchor(const Json& body, Anchor& anchor, std::vector<FieldError>& err
   fields.finish();
 }
 
+Ordered site_base_json(const Site& site) {
+  const auto text = [](const std::string& t) { return t.empty() ? Ordered(nullptr) : Ordered(t); };
+  return {{"site", to_string(site.id)},
+          {"frame", text(site.crs_frame)},
+          {"epoch", site.crs_epoch ? Ordered(*site.crs_epoch) : Ordered(nullptr)},
+          {"source", text(site.base_source)},
+          {"sigma_m", site.base_sigma_m ? Ordered(*site.base_sigma_m) : Ordered(nullptr)}};
+}
+
+void set_site_base(const Ordered& base, Site& site) {
+  if (!base.is_object() || base.value("site", Ordered()) != to_string(site.id)) return;
+  const auto text = [&](const char* name, std::string& to) {
+    if (base.contains(name)) to = base[name].is_string() ? base[name].get<std::string>() : "";
+  };
+  const auto number = [&](const char* name, std::optional<double>& to) {
+    if (base.contains(name))
+      to = base[name].is_number() ? std::optional(base[name].get<double>()) : std::nullopt;
+  };
+  text("frame", site.crs_frame);
+  number("epoch", site.crs_epoch);
+  text("source", site.base_source);
+  number("sigma_m", site.base_sigma_m);
+}
+
 }  // namespace anchord::api

@@ -6,6 +6,7 @@
 
 #include "api/admin/job_service.hpp"
 #include "api/anchors/contradiction_watch.hpp"
+#include "api/anchors/site_json.hpp"
 #include "api/calibration/calibration_place.hpp"
 #include "api/calibration/calibration_work.hpp"
 #include "api/calibration/flight_loading.hpp"
@@ -78,15 +79,6 @@ Result<void> choose_frame(const std::vector<FlightData>& flights, SiteStore& sit
   }
   out.origin = out.frame == TrackFrame::wgs84 ? options.origin : std::nullopt;
   return boost::outcome_v2::success();
-}
-
-Json site_base(const Site& site) {
-  const auto text = [](const std::string& t) { return t.empty() ? Json(nullptr) : Json(t); };
-  return {{"site", to_string(site.id)},
-          {"frame", text(site.crs_frame)},
-          {"epoch", site.crs_epoch ? Json(*site.crs_epoch) : Json(nullptr)},
-          {"source", text(site.base_source)},
-          {"sigma_m", site.base_sigma_m ? Json(*site.base_sigma_m) : Json(nullptr)}};
 }
 
 /// Anchors that the ranges of a flight name, those included that a person left out.
@@ -335,7 +327,7 @@ Result<CalibrationService::Prepared> CalibrationService::prepare(const Calibrati
   BOOST_OUTCOME_TRYV(ask_kits(request, out));
   if (const auto& site = task.flights.front().mission.site) {
     if (const auto found = deps_.sites.site(*site)) {
-      order.base_json = to_wire(site_base(found.value()));
+      order.base_json = to_wire(site_base_json(found.value()));
       // Local metres say nothing of a base.
       if (order.frame == TrackFrame::wgs84) order.base_sigma_m = found.value().base_sigma_m;
     }

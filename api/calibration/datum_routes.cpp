@@ -2,6 +2,7 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "api/anchors/site_json.hpp"
 #include "api/calibration/calibration_json.hpp"
 #include "api/calibration/datum_change.hpp"
 #include "api/calibration/revision_news.hpp"
@@ -83,6 +84,7 @@ Changed changed(CalibrationApi& s, const Request& request, const DatumRequest& w
   out.calibration.origin = origin;
   out.calibration.created = s.clock.now();
   out.calibration.settings = {to_wire(Ordered{{"datum_change", nlohmann::json::parse(request.body)}})};
+  out.calibration.provenance = {to_wire(Ordered{{"base", site_base_json(site)}})};
   for (const auto& position : positions) {
     const Estimate now = in_datum(position, change, wanted.sigma_m, origin);
     const Eigen::Vector3d by_m = EnuFrame(*position.estimate.best->wgs84).enu_from_wgs84(*now.best->wgs84).m;

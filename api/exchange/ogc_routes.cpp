@@ -80,7 +80,7 @@ std::vector<Item> revision_items(ExchangeApi& s) {
   for (const auto& anchor : anchors) {
     bool newest = true;
     for (const auto& position : value_or_problem(s.anchors.revisions.history(anchor.network_id))) {
-      const auto feature = lookup.feature(anchor, position, position.since_revision);
+      const auto feature = lookup.feature(anchor, position, position.since_revision, !newest);
       auto item =
           item_of(feature, std::to_string(position.since_revision) + '-' + to_string(anchor.network_id));
       item.feature["id"] = item.key;

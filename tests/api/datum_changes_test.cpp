@@ -84,6 +84,34 @@ TEST_F(DatumChanges, HoldBackWhatIsMadeOfFlightsBeforeThem) {
   EXPECT_EQ(gate_of(solved(flown(made(23), 0, site_id))["id"].get<std::string>()), "passed");
 }
 
+TEST_F(DatumChanges, LeaveEarlierRevisionsWithTheBaseAndTheDatumTheyWereMadeWith) {
+  const auto site_id = site(square(40));
+  const auto set_base = [&](const std::string& crs) {
+    Call options;
+    options.headers["if-match"] = header(get("/api/v1/sites/" + site_id), "ETag");
+    options.headers["content-type"] = "application/merge-patch+json";
+    const auto done = call(Method::patch, "/api/v1/sites/" + site_id, R"({"crs":)" + crs + "}", options);
+    EXPECT_EQ(done.status, 200) << done.body;
+  };
+  set_base(R"({"frame":"ETRF2000","epoch":2020.5,"base":{"source":"survey_in","sigma_m":1.5}})");
+  const auto answer = solved(flown(made(21), 0, site_id));
+  const auto published = post("/api/v1/calibrations/" + answer.value("id", "") + "/publish",
+                              R"({"anchors":["0x6000","0x6001"],"reason":"seen"})");
+  ASSERT_EQ(published.status, 201) << published.body;
+  const auto before = features();
+  ASSERT_GT(before[0]["properties"]["accuracy"]["absolute"]["h95_m"], 3.6);
+  ASSERT_EQ(post("/api/v1/sites/" + site_id + "/datum",
+                 R"({"shift":{"east_m":1,"north_m":0,"up_m":0},"note":"base surveyed again"})")
+                .status,
+            201);
+  set_base(R"({"frame":"ITRF2014","epoch":2026.5,"base":{"source":"known_point","sigma_m":0.008}})");
+  const auto then = features("1"), now = features();
+  EXPECT_EQ(then, before) << "what was wrong by 1 m is not known to 8 mm since";
+  EXPECT_LT(now[0]["properties"]["accuracy"]["absolute"]["h95_m"], 1.0);
+  EXPECT_EQ(now[0]["properties"]["crs"]["frame"], "ITRF2014");
+  EXPECT_EQ(then[0]["properties"]["crs"]["frame"], "ETRF2000");
+}
+
 TEST_F(DatumChanges, PutAMarkWhereItIs) {
   const auto path = "/api/v1/sites/" + published_site() + "/datum";
   const Wgs84 at = place(features()[0]);
