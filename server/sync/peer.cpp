@@ -41,6 +41,14 @@ double chance_of_pause() {
   return std::uniform_real_distribution<double>(0, 1)(chance);
 }
 
+/// Of somebody on the way: no answer under /api is one, nor sends elsewhere.
+bool is_web_page(const server::ClientResponse& answer) {
+  const auto type = answer.headers.find("content-type");
+  const bool html = type != answer.headers.end() && type->second.starts_with("text/html");
+  const bool elsewhere = answer.status >= 300 && answer.status < 400 && answer.status != 304;
+  return elsewhere || (html && answer.status < 500);
+}
+
 bool again_later(int status) { return status == 408 || status == 425 || status == 429 || status >= 500; }
 
 }  // namespace
@@ -96,6 +104,10 @@ Result<server::ClientResponse> Peer::once(const PeerRequest& request) {
                                                 .most_bytes = request.most_bytes});
   if (!answer && answer.error().code == Errc::bad_frame)
     return stranger(request.target, answer.error().message);
+  if (answer && known_ && request.into == nullptr && is_web_page(answer.value()))
+    return make_error(Errc::link_lost, options_.url + " " + request.target + ": a web page answers (" +
+                                           std::to_string(answer.value().status) +
+                                           "), not the server: does this network want somebody to sign in?");
   return answer;
 }
 
@@ -168,6 +180,8 @@ Error Peer::stranger(const std::string& target, const std::string& what) const {
 
 Result<Json> Peer::get(const std::string& target) {
   BOOST_OUTCOME_TRY(const auto answer, call({"GET", target}));
+  if (answer.status >= 300 && answer.status < 400)
+    return stranger(target, "it sends elsewhere (" + std::to_string(answer.status) + ")");
   if (answer.status >= 300)
     return make_error(errc_of(answer.status), options_.url + " GET " + target + ": " + in_words(answer));
   auto json = json_of(answer);

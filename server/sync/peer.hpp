@@ -72,6 +72,9 @@ class Peer {
                     const std::function<Result<void>(const nlohmann::json& item)>& take);
   /// The same, kept: 64 MB of text at most, which are half a million flights by id, name and state.
   Result<std::vector<nlohmann::json>> list(const std::string& target);
+  /// From now on a web page in place of an answer is a link that is lost: this address is an anchord
+  /// server's, and a guest network that wants somebody to sign in goes again.
+  void is_known() { known_ = true; }
   /// An error about an answer that no anchord gives.
   Error stranger(const std::string& target, const std::string& what) const;
 
@@ -82,6 +85,7 @@ class Peer {
 
   PeerOptions options_;
   server::HttpClient quick_, slow_;
+  bool known_{false};
 };
 
 /// "409 what the problem says"
