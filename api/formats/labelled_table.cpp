@@ -204,6 +204,12 @@ class TableReader {
         return make_error(Errc::invalid_argument, file_ + ": column " + header_.names[c] +
                                                       " is in a unit that is not read: convert it to metres");
     if (label_ != k_no_column) out_.label_column = header_.names[label_];
+    other_labels_.clear();
+    for (const auto& name : k_label) {
+      const auto at = header_.of(name);
+      if (options_.label.empty() && ClassReader::says_it(name) && at != k_no_column && at != label_)
+        other_labels_.push_back(at);
+    }
     if (truth_ != k_no_column) out_.truth_column = header_.names[truth_];
     BOOST_OUTCOME_TRY(choose_groups());
     BOOST_OUTCOME_TRY(choose_placements());
@@ -365,6 +371,15 @@ class TableReader {
     return std::nullopt;
   }
 
+  /// Another column that says the class by its name says the other one; empty: none does.
+  std::string contradicting(const std::vector<std::string_view>& cells, bool los) {
+    for (const auto at : other_labels_) {
+      const auto said = beside_.read(header_.names[at], cells[at]);
+      if (said == (los ? ClassReader::Said::nlos : ClassReader::Said::los)) return header_.names[at];
+    }
+    return {};
+  }
+
   bool truth_given() const { return !options_.truth.empty() || header_.first(k_truth) != k_no_column; }
   bool no_levels() const {
     for (const auto* names : {&k_rx, &k_fp, &k_f1, &k_cir_power, &k_std_noise})
@@ -428,6 +443,9 @@ class TableReader {
       return drop(header_.names[range_] + " is more than 100 m off its true range", line);
     std::optional<bool> los;
     if (label_ != k_no_column && !(los = class_of(cells[label_], line))) return;
+    if (los)
+      if (const auto other = contradicting(cells, *los); !other.empty())
+        return drop(other + " contradicts " + header_.names[label_], line);
 
     nlos::DiagnosticSample s;
     if (range_ != k_no_column) s.range_m = range;
@@ -478,7 +496,8 @@ class TableReader {
   std::vector<std::size_t> group_columns_, placement_columns_, raw_columns_;
   std::map<const Names*, std::size_t> level_columns_;  ///< what features are computed from
   std::vector<double> values_, times_;
-  ClassReader classes_;
+  std::vector<std::size_t> other_labels_;  ///< that say the class by their names too
+  ClassReader classes_, beside_;
   std::string unreadable_class_{};  ///< the first
   Ratios ratios_{};
   std::optional<Error> fatal_{};

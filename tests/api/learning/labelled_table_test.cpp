@@ -88,6 +88,19 @@ TEST_F(LabelledTableTest, NeverTakesAnUnknownWordForNlos) {
             std::string::npos);
 }
 
+TEST_F(LabelledTableTest, LeavesOutRowsWhoseColumnsOfTheClassContradictEachOther) {
+  const auto path = plain("r.csv", "los,nlos,range_m\n1,0,5\n0,1,6\n1,1,7\n0,0,8\n,1,9\n");
+  const auto t = read({path});
+  ASSERT_TRUE(t) << t.error().message;
+  EXPECT_EQ(t.value().los, (std::vector<std::optional<bool>>{true, false, false}));
+  const auto& [n, where] = t.value().dropped.at("los contradicts nlos");
+  EXPECT_EQ(n, 2U);
+  EXPECT_NE(where.find("r.csv:4"), std::string::npos) << where;
+  TableOptions options;
+  options.label = "los";
+  EXPECT_EQ(read({path}, options).value().rows(), 4U) << "the column that was chosen counts alone";
+}
+
 TEST_F(LabelledTableTest, NamesTheColumnsOfAFileWithoutRangesAndTakesOneByName) {
   const auto path = plain("r.csv", "env,dist_to_anchor,nlos\na,5,0\n");
   const auto none = read({path});
