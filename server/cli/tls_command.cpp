@@ -141,8 +141,8 @@ int renew(TlsOptions options) {
                   "no authority (ca.pem and ca.key) in " + folder.string() +
                       ": 'anchord tls init' creates one; give another folder with --dir",
                   2);
+  const auto former = server::facts_of(text_of(folder / k_certificate), (folder / k_certificate).string());
   if (options.wanted.names.empty()) {
-    const auto former = server::facts_of(text_of(folder / k_certificate), (folder / k_certificate).string());
     if (!former) return failed("anchord", former.error().message + "; give its names with --name", 2);
     options.wanted.names = former.value().names;
   }
@@ -152,6 +152,17 @@ int renew(TlsOptions options) {
   if (const auto written = write_pair(folder / k_certificate, folder / k_key, made.value()); !written)
     return failed("anchord", written.error().message);
   if (const int code = print_made(folder); code != 0) return code;
+  std::vector<std::string> gone;
+  if (former) {
+    std::ranges::copy_if(former.value().names, std::back_inserter(gone), [&](const std::string& name) {
+      return std::ranges::find(options.wanted.names, name) == options.wanted.names.end();
+    });
+  }
+  if (!gone.empty())
+    std::printf(
+        "\nNo longer for %s: clients that use it will refuse this server. --name replaces the former names: "
+        "give it for each one, or leave it out to keep them.\n",
+        printable(joined(gone)).c_str());
   std::printf(
       "\nA running server loads it at SIGHUP (systemctl reload anchord). Clients already trust it.\n");
   return 0;

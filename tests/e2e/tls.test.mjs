@@ -58,6 +58,9 @@ test('keys are for their owner alone, and nothing is replaced unasked', async ()
   assert.equal((await tls('init', '--dir', other)).code, 0);
   assert.equal((await tls('init', '--dir', other, '--force')).code, 0);
   assert.equal((await tls('init', '--dir', other, '--force', '--name', 'a b')).code, 2);
+  assert.equal((await tls('init', '--dir', other, '--force', '--name', 'hangar.local')).code, 0);
+  assert.doesNotMatch((await tls('renew', '--dir', other)).stdout, /No longer/);
+  assert.match((await tls('renew', '--dir', other, '--name', '192.0.2.7')).stdout, /No longer for hangar\.local:/);
   rmSync(other, { recursive: true });
 });
 
