@@ -109,6 +109,10 @@ std::string figure(double value) {
   return text;
 }
 
+/// Name of the check that is helps in the candidate's own cross-validation.
+constexpr const char* k_in_folds = "cross_validation";
+std::string in_folds(std::string_view name) { return name == k_in_folds ? " in cross-validation" : ""; }
+
 /// Collects checks, and in words what failed.
 class Checks {
  public:
@@ -131,9 +135,10 @@ class Checks {
       out.checks.push_back(std::move(check));
   }
   /// Beside chance, where both classes are there: what is wrong more often than a coin is no identification.
-  void better_than_chance(const Figures& mine, const std::string& basis, const std::string& where) {
+  void better_than_chance(const Figures& mine, const char* name, const std::string& basis) {
     if (!mine.balanced) return;
-    GateCheck check{"helps", mine.balanced, 0.5, true, basis};
+    GateCheck check{name, mine.balanced, 0.5, true, basis};
+    const std::string where = in_folds(name);
     if (*mine.balanced < 0.5 + k_slack)
       fail(std::move(check),
            "balanced accuracy " + figure(*mine.balanced) + where + " is no better than chance");
@@ -141,8 +146,9 @@ class Checks {
       out.checks.push_back(std::move(check));
   }
   /// Beside no correction.
-  void corrects(const Figures& mine, const std::string& basis, const std::string& where) {
-    GateCheck check{"helps", mine.mae_m, mine.mae_raw_m, true, basis};
+  void corrects(const Figures& mine, const char* name, const std::string& basis) {
+    GateCheck check{name, mine.mae_m, mine.mae_raw_m, true, basis};
+    const std::string where = in_folds(name);
     if (!mine.mae_m || !mine.mae_raw_m)
       fail(std::move(check),
            "nothing shows that the correction helps in places that were not used in training");
@@ -274,11 +280,10 @@ void check_figures(const ml::Model& candidate, const Figures& mine, const Figure
                    Checks& checks) {
   const bool folds_too = basis.believe_manifest && basis.name != "manifest";
   const Figures folds = folds_too ? manifest_figures(candidate) : Figures{};
-  const std::string in_folds = " in cross-validation";
   if (candidate.info.task != ml::Task::nlos_id) {
     checks.no_worse("mae_m", mine.mae_m, theirs.mae_m, basis.name, "");
-    checks.corrects(mine, basis.name, "");
-    if (folds.mae_m && folds.mae_raw_m) checks.corrects(folds, "manifest", in_folds);
+    checks.corrects(mine, "helps", basis.name);
+    if (folds.mae_m && folds.mae_raw_m) checks.corrects(folds, k_in_folds, "manifest");
     checks.honest_sigma(mine, basis.name);
     return;
   }
@@ -288,8 +293,8 @@ void check_figures(const ml::Model& candidate, const Figures& mine, const Figure
   if (mine.commonest && (!basis.believe_manifest || beaten))
     checks.helps(mine, basis.name, "");
   else
-    checks.better_than_chance(mine, basis.name, "");
-  checks.better_than_chance(folds, "manifest", in_folds);
+    checks.better_than_chance(mine, "helps", basis.name);
+  checks.better_than_chance(folds, k_in_folds, "manifest");
   if (mine.accuracy)
     checks.out.checks.push_back({"accuracy", mine.accuracy, theirs.accuracy, true, basis.name});
 }

@@ -12,7 +12,8 @@ namespace anchord::api {
 
 /// One comparison before a promotion.
 struct GateCheck {
-  std::string name;  ///< single_ranges, plausible, evaluated, same_rows, fpr, accuracy, mae_m, helps, sigma,
+  std::string name;  ///< single_ranges, plausible, evaluated, same_rows, fpr, accuracy, mae_m, helps,
+                     ///< cross_validation, sigma,
                      ///< with_corrections, places
   std::optional<double> candidate{}, current{};
   bool passed{true};

@@ -49,6 +49,14 @@ ChecklistItem item(const char* id, const char* text, bool ok, bool overridable, 
   return {id, text, std::move(detail), ok, overridable, {}, {}};
 }
 
+ChecklistItem station_item(const OtherOnLink& same) {
+  return item("station", "No other ground station has the id of this one", false, true,
+              (same.sender.empty() ? std::string("one on the link") : "one at " + same.sender) +
+                  words(" sends as system %.0f", same.system) + words(", component %.0f", same.component) +
+                  ": the autopilot's answers to it can be taken for answers to anchord; give it another "
+                  "system id (QGroundControl: Application Settings, MAVLink, Ground Station ID)");
+}
+
 }  // namespace
 
 std::vector<ChecklistItem> make_checklist(const ChecklistFacts& f) {
@@ -66,14 +74,7 @@ std::vector<ChecklistItem> make_checklist(const ChecklistFacts& f) {
                        : !d.connected   ? "no heartbeat" + (d.link_fault.empty() ? "" : ": " + d.link_fault)
                        : !stale.empty() ? stale
                                         : d.autopilot + ", " + d.mode + (d.failsafe ? ", failsafe" : "")));
-    if (const auto* same = same_station(d))
-      out.push_back(item("station", "No other ground station has the id of this one", false, true,
-                         (same->sender.empty() ? std::string("one on the link") : "one at " + same->sender) +
-                             words(" sends as system %.0f", same->system) +
-                             words(", component %.0f", same->component) +
-                             ": the autopilot's answers to it can be taken for answers to anchord; give it "
-                             "another system id (QGroundControl: Application Settings, MAVLink, Ground "
-                             "Station ID)"));
+    if (const auto* same = same_station(d)) out.push_back(station_item(*same));
     auto arming =
         item("arming", "The autopilot is ready to arm", d.ready_to_arm.value_or(false), true,
              d.ready_to_arm.value_or(false) ? "its pre-arm checks pass"
