@@ -17,6 +17,13 @@ class MissionCorrection : public MissionLive {
   void finish(const std::string& id) {
     ASSERT_EQ(post(path(id) + "/actions", R"({"action":"finish"})").status, 200);
   }
+  std::pair<std::string, FlightData> finished_flight(const MadeFlight& made) {
+    auto flight = streamed(made);
+    const auto id = mission("local");
+    deliver(id, flight, 0, 120.5);
+    finish(id);
+    return {id, std::move(flight)};
+  }
   double worst_m(const std::string& id, const MadeFlight& made) {
     double worst = 0;
     for (const auto& [anchor, properties] : live(id)) {
@@ -36,10 +43,7 @@ Json arm(NetworkId tag, double up_m) {
 
 TEST_F(MissionCorrection, OfAWrongLeverArmMovesTheEstimatesToTheTruth) {
   const MadeFlight made;
-  const auto flight = streamed(made);
-  const auto id = mission("local");
-  deliver(id, flight, 0, 120.5);
-  finish(id);
+  const auto [id, flight] = finished_flight(made);
   ASSERT_EQ(correct(id, arm(flight.ranges.front().tag, 1.5), etag(id)).status, 200);
   EXPECT_GT(worst_m(id, made), 1.0) << "the arm is not used";
   ASSERT_EQ(correct(id, arm(flight.ranges.front().tag, 0), etag(id)).status, 200);
@@ -49,10 +53,7 @@ TEST_F(MissionCorrection, OfAWrongLeverArmMovesTheEstimatesToTheTruth) {
 
 TEST_F(MissionCorrection, OfALeverArmHoldsBackWhatWasSolvedBefore) {
   const MadeFlight made;
-  const auto flight = streamed(made);
-  const auto id = mission("local");
-  deliver(id, flight, 0, 120.5);
-  finish(id);
+  const auto [id, flight] = finished_flight(made);
   Call options;
   options.headers["prefer"] = "wait=120";
   const auto solved =

@@ -41,6 +41,16 @@ async function rig(work, { token = true, args = [] } = {}) {
 }
 const recordsInto = (gateway, mission) =>
   eventually('the gateway knows the mission', async () => (await gateway.status()).mission.id === mission, 20_000);
+/** So many rows a second, of which more than `stored` are there; their mission. */
+async function flows({ server, feeder, gateway }, rowsPerS, stored) {
+  const mission = await recordingMission(server);
+  await gateway.start();
+  await recordsInto(gateway, mission);
+  await eventually('the tag is there', () => feeder.connected);
+  feeder.run(rowsPerS);
+  await eventually('rows arrive', async () => (await storedCount(server, mission)) > stored);
+  return mission;
+}
 const drained = (gateway, deadlineMs = 60_000) =>
   eventually('all rows have left', async () => (await gateway.status()).outbox.rows === 0, deadlineMs, 100);
 async function everyRowOnce(server, mission, feeder) {
@@ -62,12 +72,7 @@ test('with the link off and then slow nothing is lost, live rows come first and 
 
 test('a link that swallows everything is noticed, and live is back within 10 s', () =>
   rig(async ({ server, feeder, proxy, gateway }) => {
-    const mission = await recordingMission(server);
-    await gateway.start();
-    await recordsInto(gateway, mission);
-    await eventually('the tag is there', () => feeder.connected);
-    feeder.run(100);
-    await eventually('rows arrive', async () => (await storedCount(server, mission)) > 0);
+    const mission = await flows({ server, feeder, gateway }, 100, 0);
     proxy.silence();
     await eventually('the link is lost', async () => (await gateway.status()).link.state === 'lost', 15_000);
     await sleep(3_000);
@@ -85,12 +90,7 @@ test('a link that swallows everything is noticed, and live is back within 10 s',
 
 test('a link whose answers take two seconds is filled all the same: what waits goes, and more rows than come', (t) =>
   rig(async ({ server, feeder, proxy, gateway }) => {
-    const mission = await recordingMission(server);
-    await gateway.start();
-    await recordsInto(gateway, mission);
-    await eventually('the tag is there', () => feeder.connected);
-    feeder.run(100);
-    await eventually('rows arrive', async () => (await storedCount(server, mission)) > 0);
+    const mission = await flows({ server, feeder, gateway }, 100, 0);
     await proxy.cut();
     await sleep(8_000);
     proxy.delayMs = 1_000;
@@ -273,12 +273,7 @@ const limitFiles = (child, bytes) => execFileSync('prlimit', ['--pid', `${child.
 
 test('a disk that takes nothing more stops no row while there is a link, and the gateway says so until it does', () =>
   rig(async ({ server, feeder, gateway }) => {
-    const mission = await recordingMission(server);
-    await gateway.start();
-    await recordsInto(gateway, mission);
-    await eventually('the tag is there', () => feeder.connected);
-    feeder.run(300);
-    await eventually('rows arrive', async () => (await storedCount(server, mission)) > 100);
+    const mission = await flows({ server, feeder, gateway }, 300, 100);
     limitFiles(gateway.child, 0);
     await eventually('it says so', async () => (await gateway.alarms()).includes('gateway.full'), 20_000);
     assert.equal((await fetch(`${gateway.url}/readyz`)).status, 503);

@@ -99,6 +99,53 @@ test('rows that came late for a flight that was sent go with the next sync, once
   await same(first);
 });
 
+test('a guest network that wants a sign-in in the middle of a run is waited out, and named where it answers first', async () => {
+  let seen = 0,
+    from_request = 3,
+    until_ms = null;
+  const portal = createServer((asked, answer) => {
+    if (seen++ >= from_request) {
+      until_ms ??= Date.now() + 3000;
+      if (Date.now() < until_ms) {
+        answer.writeHead(200, { 'content-type': 'text/html' });
+        answer.end('<html>Welcome to our guest network</html>');
+        return;
+      }
+    }
+    const { url, method, headers } = asked;
+    asked.pipe(
+      request({ host: '127.0.0.1', port: centre.port, path: url, method, headers }, (got) => {
+        answer.writeHead(got.statusCode, got.headers);
+        got.pipe(answer);
+      }),
+    );
+  });
+  await new Promise((done) => portal.listen(0, '127.0.0.1', done));
+  try {
+    await late(field, first, 500, 10);
+    const through = () =>
+      run(
+        ['sync', '--to', `http://127.0.0.1:${portal.address().port}`, '--token-file', join(folder, 'token')].concat([
+          '--data-dir',
+          field.dataDir,
+          '--wait',
+          '30',
+        ]),
+        { deadlineMs: 120_000 },
+      );
+    const got = await through();
+    assert.equal(got.code, 0, got.stdout + got.stderr);
+    assert.match(got.stderr, /a web page answers \(200\), not the server/);
+    await same(first);
+    [seen, from_request, until_ms] = [0, 0, Infinity];
+    const refused = await through();
+    assert.equal(refused.code, 2, refused.stdout + refused.stderr);
+    assert.match(refused.stderr, /is this the address of an anchord server/);
+  } finally {
+    portal.close();
+  }
+});
+
 test('a flight that was corrected on both sides stays as it is there, is named, and its rows go', async () => {
   await correct(centre, first, { name: 'named at the centre' });
   await correct(field, first, { tags: [{ tag: '0x6e01', antenna: 0, lever_arm_body_m: [0.5, 0, -0.3] }] });
@@ -194,51 +241,4 @@ test('a measurement that differs is named and keeps its flight out, and no other
   assert.equal(n_ranges, before.n_ranges, 'none of its rows');
   const of = async (server) => (await ok(server, `/api/v1/missions/${first}`)).n_ranges;
   assert.equal(await of(centre), await of(field));
-});
-
-test('a guest network that wants a sign-in in the middle of a run is waited out, and named where it answers first', async () => {
-  let seen = 0,
-    from_request = 3,
-    until_ms = null;
-  const portal = createServer((asked, answer) => {
-    if (seen++ >= from_request) {
-      until_ms ??= Date.now() + 3000;
-      if (Date.now() < until_ms) {
-        answer.writeHead(200, { 'content-type': 'text/html' });
-        answer.end('<html>Welcome to our guest network</html>');
-        return;
-      }
-    }
-    const { url, method, headers } = asked;
-    asked.pipe(
-      request({ host: '127.0.0.1', port: centre.port, path: url, method, headers }, (got) => {
-        answer.writeHead(got.statusCode, got.headers);
-        got.pipe(answer);
-      }),
-    );
-  });
-  await new Promise((done) => portal.listen(0, '127.0.0.1', done));
-  try {
-    await late(field, first, 500, 10);
-    const through = () =>
-      run(
-        ['sync', '--to', `http://127.0.0.1:${portal.address().port}`, '--token-file', join(folder, 'token')].concat([
-          '--data-dir',
-          field.dataDir,
-          '--wait',
-          '30',
-        ]),
-        { deadlineMs: 120_000 },
-      );
-    const got = await through();
-    assert.equal(got.code, 0, got.stdout + got.stderr);
-    assert.match(got.stderr, /a web page answers \(200\), not the server/);
-    await same(first);
-    [seen, from_request, until_ms] = [0, 0, Infinity];
-    const refused = await through();
-    assert.equal(refused.code, 2, refused.stdout + refused.stderr);
-    assert.match(refused.stderr, /is this the address of an anchord server/);
-  } finally {
-    portal.close();
-  }
 });
