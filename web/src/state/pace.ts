@@ -3,7 +3,7 @@
 import { options } from 'preact';
 
 const LONG_MS = 150,
-  LONGEST_REST_MS = 1000;
+  LONGEST_REST_MS = 4000; ///< on a twelfth of a slow CPU a picture takes two to three seconds
 
 /// When the next picture may begin. No DOM.
 export class Pace {
