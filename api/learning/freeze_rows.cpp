@@ -176,9 +176,10 @@ std::string split_report_json(const DatasetTable& table, Place split_by,
   const auto duplicates = copies(table);
   Ordered warnings = Ordered::array();
   if (duplicates > 0)
-    warnings.push_back(std::to_string(duplicates) +
-                       " held-out rows stand in the training part too, number by number: figures on them "
-                       "promise too much, and the gate of models leaves them out");
+    warnings.push_back(
+        std::to_string(duplicates) +
+        " held-out rows are in the training part too, with the same numbers: figures on them promise too "
+        "much, and the gate of models leaves them out");
   if (test.rows == 0) warnings.push_back("no part is held out: the figures come from cross-validation only");
   if (!campaigns.empty())
     warnings.push_back("train and test have a campaign in common: the same radios, perhaps the same day");

@@ -134,7 +134,7 @@ class Checks {
     else
       out.checks.push_back(std::move(check));
   }
-  /// Beside chance, where both classes are there: what is wrong more often than a coin is no identification.
+  /// Compared with chance, where both classes are there.
   void better_than_chance(const Figures& mine, const char* name, const std::string& basis) {
     if (!mine.balanced) return;
     GateCheck check{name, mine.balanced, 0.5, true, basis};
@@ -261,8 +261,9 @@ void check_together(const ml::Model& candidate, const GateData& data, Checks& ch
     if (!both) continue;
     GateCheck check{"with_corrections", both->mae_m, both->mae_before_m, true, on.basis};
     if (both->mae_m > both->mae_before_m + k_most_harm_m)
-      checks.fail(std::move(check), "with its classes the active corrections leave " + figure(both->mae_m) +
-                                        " m, and without it " + figure(both->mae_before_m) + " m");
+      checks.fail(std::move(check), "with its classes the active corrections leave a mean error of " +
+                                        figure(both->mae_m) + " m, without it " + figure(both->mae_before_m) +
+                                        " m");
     else
       checks.out.checks.push_back(std::move(check));
     return;

@@ -38,10 +38,11 @@ Eigen::Matrix3d held_height_m2(const FlightRows& flight, const JointFit& fit, st
 Gate held_height_gate(const FlightOptions& options) {
   if (!options.anchor_height_m)
     return {k_held_height_gate, std::nullopt, k_most_sigma_m, false,
-            "nobody stated the height of the anchors, and in the plane no range measures it: it is held at "
-            "the mean height of the track; state it (anchor_height_m), or solve in three dimensions"};
+            "the height of the anchors was not given, and in two dimensions no range measures it: it is held "
+            "at the "
+            "mean height of the track; give it (anchor_height_m), or solve in three dimensions"};
   char why[120];
-  std::snprintf(why, sizeof why, "sigma of the height that was stated and held, %.2f m", sigma_m(options));
+  std::snprintf(why, sizeof why, "sigma of the given height, which is held: %.2f m", sigma_m(options));
   return {k_held_height_gate, sigma_m(options), k_most_sigma_m, sigma_m(options) <= k_most_sigma_m, why};
 }
 

@@ -304,7 +304,7 @@ void add_options(CLI::App& command, Arguments& a) {
       "(the heights of the table), else z; without it none is acceptable");
   command
       .add_option("--height-sigma", a.height_sigma_m,
-                  "One sigma of that height as it was stated, in metres: every region holds it [0.1]")
+                  "One sigma of that height in metres: every region includes it [0.1]")
       ->needs(height)
       ->check(CLI::Range(0.001, 100.0));
   command

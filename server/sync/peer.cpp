@@ -41,12 +41,12 @@ double chance_of_pause() {
   return std::uniform_real_distribution<double>(0, 1)(chance);
 }
 
-/// Of somebody on the way: no answer under /api is one, nor sends elsewhere.
+/// Of somebody on the way: no answer of a server is one, or redirects.
 bool is_web_page(const server::ClientResponse& answer) {
   const auto type = answer.headers.find("content-type");
   const bool html = type != answer.headers.end() && type->second.starts_with("text/html");
-  const bool elsewhere = answer.status >= 300 && answer.status < 400 && answer.status != 304;
-  return elsewhere || (html && answer.status < 500);
+  const bool redirects = answer.status >= 300 && answer.status < 400 && answer.status != 304;
+  return redirects || (html && answer.status < 500);
 }
 
 bool again_later(int status) { return status == 408 || status == 425 || status == 429 || status >= 500; }
@@ -181,7 +181,7 @@ Error Peer::stranger(const std::string& target, const std::string& what) const {
 Result<Json> Peer::get(const std::string& target) {
   BOOST_OUTCOME_TRY(const auto answer, call({"GET", target}));
   if (answer.status >= 300 && answer.status < 400)
-    return stranger(target, "it sends elsewhere (" + std::to_string(answer.status) + ")");
+    return stranger(target, "it redirects (" + std::to_string(answer.status) + ")");
   if (answer.status >= 300)
     return make_error(errc_of(answer.status), options_.url + " GET " + target + ": " + in_words(answer));
   auto json = json_of(answer);

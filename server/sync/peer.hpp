@@ -74,7 +74,7 @@ class Peer {
   Result<std::vector<nlohmann::json>> list(const std::string& target);
   /// From now on a web page in place of an answer is a link that is lost: this address is an anchord
   /// server's, and a guest network that wants somebody to sign in goes again.
-  void is_known() { known_ = true; }
+  void set_known() { known_ = true; }
   /// An error about an answer that no anchord gives.
   Error stranger(const std::string& target, const std::string& what) const;
 

@@ -34,7 +34,7 @@ Result<void> check(Run& run, Peer& peer, std::span<const std::string_view> roles
                                                   "--role " +
                                                   least + "'");
   if (member(me, "sites").is_array()) run.whole_servers = false;
-  peer.is_known();
+  peer.set_known();
   if (&peer == &run.centre) run.report(peer.url() + ": anchord " + text_of(version, "version"));
   return boost::outcome_v2::success();
 }

@@ -35,8 +35,8 @@ const WORDS: Record<string, Words> = {
     least: true,
   },
   held_height: {
-    passes: 'The height was stated by a person, σ',
-    fails: 'The height was not measured, nor stated well enough, σ',
+    passes: 'The height was given, σ',
+    fails: 'The height was neither measured nor given well enough, σ',
     unit: 'm',
   },
   outline: { passes: 'Inside the outline of the building', fails: 'Outside the outline of the building', unit: 'm' },
