@@ -161,7 +161,7 @@ async function fly_and_measure(row, views, shaped) {
     link = shaped && !shape(server.port) ? await slowLink(server.port) : null;
     if (link) row('link of 1 Mbit/s', 'a proxy', 'tc cannot shape a network namespace here');
     const screen = link ? { url: `http://127.0.0.1:${link.port}` } : server;
-    browser = await openBrowser();
+    browser = await openBrowser({ reducedMotion: 'no-preference' });
     await browser.context.addInitScript(watch_ages);
     for (const [name, how] of views) await measure(browser, screen, name, how, row);
   } finally {

@@ -20,7 +20,8 @@ const flags = [
   '--enable-unsafe-swiftshader',
 ];
 
-/** A browser context with a profile of its own: {context, page, close()}. `options` go to Playwright's context. */
+/** A browser context with a profile of its own: {context, page, close()}. `options` go to Playwright's context. Less motion is asked for unless a
+ * test says otherwise: the drone then moves ten times a second, and a page that only stands open leaves the processor to the tests beside it. */
 export async function openBrowser(options = {}) {
   const profile = mkdtempSync(join(tmpdir(), 'anchord-chromium-'));
   const context = await chromium.launchPersistentContext(profile, {
@@ -28,6 +29,7 @@ export async function openBrowser(options = {}) {
     headless: true,
     args: flags,
     viewport: { width: 1440, height: 900 },
+    reducedMotion: 'reduce',
     ...options,
   });
   const page = context.pages()[0] ?? (await context.newPage());

@@ -18,7 +18,7 @@ before(async () => {
   assert.ok(haveChromium, `${chromiumPath} is missing: apt-get install chromium`);
   const made = await run(['simulate', 'flight', '--seed', '7', '--duration', '150', '--out', flight]);
   assert.equal(made.code, 0, made.stderr);
-  browser = await openBrowser();
+  browser = await openBrowser({ reducedMotion: 'no-preference' });
   flown = await startServer({ auth: 'off' });
 });
 after(async () => {

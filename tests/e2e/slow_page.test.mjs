@@ -13,7 +13,7 @@ let browser, server, flight;
 before(async () => {
   server = await startServer({ args: feeder_args });
   flight = await fly_fifty(server);
-  browser = await openBrowser();
+  browser = await openBrowser({ reducedMotion: 'no-preference' });
   await browser.context.addInitScript(watch_ages);
 });
 after(async () => {

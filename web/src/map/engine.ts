@@ -31,7 +31,8 @@ export interface MapHooks {
 // Metres of a site: no projection on the globe, so ellipses are ellipses and doubles go all the way.
 const ENU = new Projection({ code: 'anchord:enu', units: 'm', extent: [-2e5, -2e5, 2e5, 2e5] });
 const PLAN_NEAR_M = 300;
-// Between two pictures while the drone moves by less than a pixel, and while nothing comes of it: the battery is an operator's too.
+// Between two pictures while the drone moves by less than a pixel, and while nothing comes of it or less motion is asked for: the battery is an
+// operator's too.
 const PICTURE_MS = 1000 / 60,
   STANDS_MS = 50,
   QUIET_MS = 95;
@@ -238,7 +239,8 @@ export function open_map(
     const content = hooks.content(),
       scene = content.scene,
       flies = scene?.pose && t - scene.pose.came_ms < 1500 ? scene : null;
-    rest(flies ? Math.min(STANDS_MS, ms_a_pixel(flies, camera().px_per_m * screen_ratio())) : QUIET_MS);
+    const glides = flies && !reduced.matches;
+    rest(glides ? Math.min(STANDS_MS, ms_a_pixel(flies, camera().px_per_m * screen_ratio())) : QUIET_MS);
     if (t - aimed_ms > 300) {
       aimed_ms = t;
       aim();
