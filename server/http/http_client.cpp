@@ -20,11 +20,18 @@
 namespace anchord::server {
 namespace {
 
+/// Digits, or in brackets: nothing that is looked up.
+bool is_address(std::string_view origin) {
+  const auto host = origin.substr(origin.find("://") + 3);
+  return host.starts_with('[') || host.find_first_not_of("0123456789.:") == std::string_view::npos;
+}
+
 std::string why(httplib::Error error, const std::string& origin) {
   switch (error) {
     case httplib::Error::Connection:
     case httplib::Error::ConnectionTimeout:
-      return "cannot reach " + origin + ": is a server running there?";
+      return "cannot reach " + origin + (is_address(origin) ? ": is" : ": is the name right, and is") +
+             " a server running there?";
     case httplib::Error::Read:
       return origin + " did not answer in time, or closed the connection";
     case httplib::Error::Write:
@@ -120,6 +127,11 @@ class Exchange {
     const bool part = response_.status == 206 && request_.into_at > 0;
     into_ = response_.status == 200 || part ? request_.into : nullptr;
     if (into_ == nullptr) return;
+    if (request_.accepts)
+      if (auto accepted = request_.accepts(response_); !accepted) {
+        failure_ = accepted.error();
+        return;
+      }
     if (part &&
         !response_.headers["content-range"].starts_with("bytes " + std::to_string(request_.into_at) + '-')) {
       failure_ = make_error(Errc::bad_frame, "the answer is another part than was asked for");

@@ -31,7 +31,9 @@ struct ClientRequest {
   std::optional<std::uint64_t> from_bytes{};
   std::FILE* into{nullptr};  ///< becomes the body of a 200
   std::uint64_t into_at{0};  ///< a 206 goes on from here
-  /// With the head of an answer whose body goes there, before its first byte.
+  /// With the head of an answer whose body would go there, before anything of the file changes.
+  std::function<Result<void>(const ClientResponse& head)> accepts{};
+  /// With the same head when the file is as long as the answer says, before the body's first byte.
   std::function<Result<void>(const ClientResponse& head)> begins{};
   /// Of the answer, unpacked. With it the answer must also begin within the time-out after the last byte of
   /// the request, and then come with some speed.

@@ -3,6 +3,7 @@
 #include <nlohmann/json.hpp>
 #include <random>
 #include <thread>
+#include <utility>
 
 #include "api/kit/reader.hpp"
 #include "api/kit/support.hpp"
@@ -88,7 +89,14 @@ Result<std::unique_ptr<Peer>> Peer::to(const PeerOptions& options) {
   return std::unique_ptr<Peer>(new Peer(options, std::move(quick), std::move(slow)));
 }
 
+Result<void> Peer::is_server(const std::string& target, const server::ClientResponse& head) const {
+  if (!known_ || !is_web_page(head)) return boost::outcome_v2::success();
+  return make_error(Errc::link_lost, target + ": a web page answers (" + std::to_string(head.status) +
+                                         "), not the server: does this network want somebody to sign in?");
+}
+
 Result<server::ClientResponse> Peer::once(const PeerRequest& request) {
+  const auto accepts = [&](const server::ClientResponse& head) { return is_server(request.target, head); };
   auto answer = (request.bundle ? slow_ : quick_)
                     .call(server::ClientRequest{.method = request.method,
                                                 .target = request.target,
@@ -100,14 +108,14 @@ Result<server::ClientResponse> Peer::once(const PeerRequest& request) {
                                                 .from_bytes = request.from_bytes,
                                                 .into = request.into ? request.into->file() : nullptr,
                                                 .into_at = request.into_at,
+                                                .accepts = accepts,
                                                 .begins = request.begins,
                                                 .most_bytes = request.most_bytes});
   if (!answer && answer.error().code == Errc::bad_frame)
     return stranger(request.target, answer.error().message);
-  if (answer && known_ && request.into == nullptr && is_web_page(answer.value()))
-    return make_error(Errc::link_lost, options_.url + " " + request.target + ": a web page answers (" +
-                                           std::to_string(answer.value().status) +
-                                           "), not the server: does this network want somebody to sign in?");
+  if (!answer) return answer;
+  if (auto accepted = accepts(answer.value()); !accepted)
+    return make_error(accepted.error().code, options_.url + ": " + accepted.error().message);
   return answer;
 }
 
@@ -115,6 +123,7 @@ Result<server::ClientResponse> Peer::go_on(const std::function<Result<server::Cl
                                            const std::function<std::uint64_t()>& arrived) {
   gateway::Pauses pauses{k_first_pause, k_longest_pause};
   std::optional<Monotonic::time_point> away_since;
+  std::string told;
   for (;;) {
     const auto before = arrived();
     auto answer = attempt();
@@ -122,13 +131,14 @@ Result<server::ClientResponse> Peer::go_on(const std::function<Result<server::Cl
     if (arrived() >= before + k_progress_bytes) {
       pauses.reset();
       away_since.reset();
+      told.clear();
     }
     const auto now = Monotonic::now();
-    if (!away_since) {
-      away_since = now;
-      options_.report(answer.error().message + "; going on, for " + std::to_string(options_.give_up.count()) +
+    if (!away_since) away_since = now;
+    // Whoever reads it may have to do something about the newest of them.
+    if (std::exchange(told, answer.error().message) != answer.error().message)
+      options_.report(told + "; going on, for " + std::to_string(options_.give_up.count()) +
                       " s without a link");
-    }
     const auto wait = pauses.next(chance_of_pause());
     if (now + wait > *away_since + options_.give_up) return answer;
     std::this_thread::sleep_for(wait);
@@ -139,6 +149,7 @@ Result<server::ClientResponse> Peer::call(const PeerRequest& request) {
   gateway::Pauses pauses{k_first_pause, k_longest_pause};
   const std::string what = options_.url + " " + std::string(request.method) + " " + request.target + ": ";
   std::optional<Monotonic::time_point> away_since;
+  std::string told;
   int long_attempts = 0;
   for (;;) {
     const auto began = Monotonic::now();
@@ -166,8 +177,10 @@ Result<server::ClientResponse> Peer::call(const PeerRequest& request) {
     const bool had_link = now - began > options_.give_up && ++long_attempts <= k_most_long_attempts;
     if (!away_since || had_link) {
       away_since = now;
-      options_.report(why + "; trying again for " + std::to_string(options_.give_up.count()) + " s");
+      told.clear();
     }
+    if (std::exchange(told, why) != why)
+      options_.report(why + "; trying again for " + std::to_string(options_.give_up.count()) + " s");
     if (now + wait > *away_since + options_.give_up) return make_error(Errc::link_lost, why);
     std::this_thread::sleep_for(wait);
   }

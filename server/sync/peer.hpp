@@ -82,6 +82,8 @@ class Peer {
   Peer(PeerOptions options, server::HttpClient quick, server::HttpClient slow)
       : options_(std::move(options)), quick_(std::move(quick)), slow_(std::move(slow)) {}
   Result<server::ClientResponse> once(const PeerRequest& request);
+  /// errors: link_lost (a page of somebody on the way)
+  Result<void> is_server(const std::string& target, const server::ClientResponse& head) const;
 
   PeerOptions options_;
   server::HttpClient quick_, slow_;

@@ -219,6 +219,49 @@ test('down, over a link that breaks and past kill -9 of both ends, the rest alon
   assert.deepEqual(left_over(), []);
 });
 
+test('down, a guest network that wants a sign-in within a bundle is waited out, and what came stays', async () => {
+  const origin = { lon: 3.713, lat: 51.023, h_m: 55 };
+  const site = await ok(centre, '/api/v1/sites', { json: { name: 'Behind a hotel', origin } });
+  const building = await ok(centre, '/api/v1/buildings', { json: { site: site.id, name: 'B' } });
+  const floor = await ok(centre, '/api/v1/floors', { json: { building: building.id, name: 'F0', level: 0 } });
+  const path = `/api/v1/floors/${floor.id}`;
+  await ok(centre, `${path}/plan`, {
+    method: 'PUT',
+    headers: { 'if-match': (await centre.fetch(path)).headers.get('etag'), 'content-type': 'image/png' },
+    body: noise_png(600, 500, chance(8)),
+  });
+  const half = 150_000,
+    ranges = [];
+  let until_ms = 0;
+  const change = (req, res, back) => {
+    const bundle = req.url.startsWith(`/api/v1/sites/${site.id}/bundle`);
+    if (!back && Date.now() < until_ms) {
+      res.writeHead(200, { 'content-type': 'text/html' }).end('<html>Welcome to our guest network</html>');
+      return true;
+    }
+    if (!back && bundle) ranges.push(req.headers.range);
+    if (!back || !bundle || until_ms) return false;
+    until_ms = Infinity;
+    let left = half;
+    res.writeHead(back.statusCode, back.headers);
+    back.on('data', (bytes) => {
+      res.write(bytes.subarray(0, left));
+      left -= Math.min(left, bytes.length);
+      if (left > 0 || until_ms !== Infinity) return;
+      until_ms = Date.now() + 3000;
+      setTimeout(() => res.destroy(), 200);
+    });
+    return true;
+  };
+  await stranger(forwarding(centre, change), async (url) => {
+    const { code, stdout, stderr } = await run(words('--from', url, '--site', 'Behind a hotel', '--wait', '30'));
+    assert.equal(code, 0, stdout + stderr);
+    assert.match(stderr, /a web page answers \(200\), not the server/);
+  });
+  assert.deepEqual(ranges, [undefined, `bytes=${half}-`]);
+  assert.deepEqual(left_over(), []);
+});
+
 test('curl goes on with a flight and with a site of ours, byte for byte; a range of another version is not mixed in', async () => {
   const id = (await ok(centre, '/api/v1/missions')).items.find((one) => one.name === 'noisy 1').id;
   const whole = await bundle_of(centre, id);
