@@ -61,6 +61,14 @@ Assessment waits(Link link, std::string why, std::optional<milliseconds> wait = 
 }
 
 /// What every question has in common; nothing: a 2xx, or a 4xx that only the question can explain.
+/// Unix time of a date as servers write it (RFC 9110 section 5.6.7).
+std::optional<double> http_date_s(const std::string& text) {
+  std::tm at{};
+  const char* end = ::strptime(text.c_str(), "%a, %d %b %Y %H:%M:%S GMT", &at);
+  if (end == nullptr || *end != '\0') return std::nullopt;
+  return static_cast<double>(::timegm(&at));
+}
+
 std::optional<Assessment> assess_trouble(int status, const std::map<std::string, std::string>& headers,
                                          std::string_view body, UtcTime now) {
   const auto header = headers.find("retry-after");
@@ -98,16 +106,23 @@ std::optional<Assessment> assess_trouble(int status, const std::map<std::string,
 
 }  // namespace
 
+std::optional<double> clock_ahead_s(const std::map<std::string, std::string>& headers, UtcTime sent,
+                                    UtcTime received) {
+  const auto header = headers.find("date");
+  const auto date_s = header == headers.end() ? std::nullopt : http_date_s(header->second);
+  if (!date_s) return std::nullopt;
+  const double least_s = sent.seconds() - (*date_s + 1), most_s = received.seconds() - *date_s;
+  return least_s > 0 ? least_s : std::min(most_s, 0.0);
+}
+
 std::optional<milliseconds> retry_after(std::string_view text, UtcTime now) {
   while (text.starts_with(' ')) text.remove_prefix(1);
   std::int64_t seconds = 0;
   const auto read = std::from_chars(text.data(), text.data() + text.size(), seconds);
   if (read.ec != std::errc() || read.ptr != text.data() + text.size()) {
-    std::tm at{};
-    const std::string date(text);
-    const char* end = ::strptime(date.c_str(), "%a, %d %b %Y %H:%M:%S GMT", &at);
-    if (end == nullptr || *end != '\0') return std::nullopt;
-    seconds = static_cast<std::int64_t>(std::ceil(static_cast<double>(::timegm(&at)) - now.seconds()));
+    const auto date_s = http_date_s(std::string(text));
+    if (!date_s) return std::nullopt;
+    seconds = static_cast<std::int64_t>(std::ceil(*date_s - now.seconds()));
   }
   if (seconds < 0) seconds = 0;
   return std::min<milliseconds>(std::chrono::seconds(std::min<std::int64_t>(seconds, 3600)), k_longest_wait);

@@ -68,6 +68,11 @@ Assessment assess_question(int status, const std::map<std::string, std::string>&
 /// Retry-After: seconds or an HTTP date, at most ten minutes. Nothing: there is none, or it cannot be read.
 std::optional<std::chrono::milliseconds> retry_after(std::string_view text, UtcTime now);
 
+/// How far the clock here is ahead of the server's, negative behind it, by the Date of an answer (RFC 9110
+/// section 6.6.1, whole seconds): as much as the delay cannot explain. Nothing without a date.
+std::optional<double> clock_ahead_s(const std::map<std::string, std::string>& headers, UtcTime sent,
+                                    UtcTime received);
+
 /// Pauses between attempts that double, each drawn from three quarters to five quarters of it, so that
 /// gateways of one server do not come all at once.
 class Pauses {

@@ -146,6 +146,7 @@ struct FieldGateway::State {
     out.devices = devices->devices();
     out.recorder_failure = devices->recorder_failure();
     out.not_started = devices->not_started();
+    out.clock_skew = devices->clock().skew;
     out.rows_dropped = devices->rows_lost();
     out.rejected_file = (options.data_dir / "rejected.ndjson").string();
     return out;

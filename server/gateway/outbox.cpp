@@ -34,7 +34,8 @@ Error missing(const fs::path& file) {
       Errc::storage_unavailable,
       "the outbox " + file.string() +
           " is missing or empty, and one was made here before. Put the file back with its -wal (is the disk "
-          "mounted?). Where it is lost, start once with --new-outbox; 'anchord replay' restores its rows from "
+          "mounted?). Where it is lost, start once with --new-outbox; 'anchord replay' restores its rows "
+          "from "
           "the recordings beside it");
 }
 

@@ -317,6 +317,7 @@ class Sender::Impl {
     std::map<std::string, std::string> headers;
     if (!token_.empty()) headers.emplace("Authorization", "Bearer " + token_);
     const auto began = Monotonic::now();
+    const auto sent = clock_.now();
     // On the networks of a field anybody may answer.
     auto answer = client_.call({.method = method,
                                 .target = target,
@@ -328,7 +329,13 @@ class Sender::Impl {
     if (answer && body.size() < k_rate_from_bytes)
       delay_s_ =
           delay_s_ == 0 || took_s_ < delay_s_ ? took_s_ : delay_s_ + k_delay_rise * (took_s_ - delay_s_);
-    update([](auto& s) { ++s.requests; });
+    const auto ahead_s = answer && answer.value().status < 300
+                             ? clock_ahead_s(answer.value().headers, sent, clock_.now())
+                             : std::nullopt;
+    update([&](auto& s) {
+      ++s.requests;
+      if (ahead_s) s.clock_ahead_s = *ahead_s;
+    });
     return answer;
   }
 

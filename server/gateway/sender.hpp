@@ -42,6 +42,7 @@ struct SenderStatus {
   SteadyTime since{};  ///< of this link
   std::optional<UtcTime> last_answer{}, newest_delivered{};
   double next_try_s{};
+  double clock_ahead_s{};  ///< of the server's, by its newest answer; negative: behind
   std::uint64_t requests{}, bytes_sent{};
   double bytes_per_s{};  ///< of the newest requests with rows
   std::optional<MissionId> mission{};

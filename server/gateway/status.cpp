@@ -1,6 +1,7 @@
 #include "server/gateway/status.hpp"
 
 #include <array>
+#include <cmath>
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
@@ -12,6 +13,7 @@ namespace {
 using Ordered = nlohmann::ordered_json;
 
 constexpr double k_link_alarm_s = 10;  ///< shorter ones are the nature of such links
+constexpr double k_clock_alarm_s = 5;
 constexpr double k_filling_share = 0.8;
 constexpr std::uint64_t k_little_disk_bytes = 256u << 20;
 
@@ -84,6 +86,20 @@ void mission_alarms(const Status& s, std::vector<Alarm>& out) {
   if (!s.not_started.empty()) out.push_back({"device.not_started", s.not_started});
 }
 
+/// A receiver's time is used before the system clock's: then the clock is no matter of rows, and the
+/// difference to the server's is its own.
+void clock_alarms(const Status& s, std::vector<Alarm>& out) {
+  const double ahead_s = s.sender.clock_ahead_s;
+  if (!s.clock_skew.empty())
+    out.push_back({"clock.skew", s.clock_skew});
+  else if (std::abs(ahead_s) > k_clock_alarm_s)
+    out.push_back({"gateway.clock",
+                   "the clock of this machine is " + seconds_text(std::abs(ahead_s)) +
+                       (ahead_s > 0 ? " ahead of" : " behind") +
+                       " the server's, and rows of devices without GNSS time are stamped by it: set the "
+                       "one that is wrong (NTP)"});
+}
+
 Ordered link_json(const Status& s) {
   const bool up = s.sender.link == Link::up;
   return {{"state", k_link_words.word(s.sender.link)},
@@ -93,7 +109,8 @@ Ordered link_json(const Status& s) {
           {"next_try_s", up ? Ordered(nullptr) : Ordered(s.sender.next_try_s)},
           {"bytes_per_s", s.sender.bytes_per_s},
           {"bytes_sent", s.sender.bytes_sent},
-          {"requests", s.sender.requests}};
+          {"requests", s.sender.requests},
+          {"clock_ahead_s", s.sender.clock_ahead_s}};
 }
 
 Ordered outbox_json(const Status& s) {
@@ -130,6 +147,7 @@ std::vector<Alarm> alarms_of(const Status& status) {
   disk_alarms(status, out);
   link_alarms(status, out);
   mission_alarms(status, out);
+  clock_alarms(status, out);
   return out;
 }
 

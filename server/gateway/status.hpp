@@ -21,6 +21,7 @@ struct Status {
   std::uint64_t disk_free_bytes{};
   std::vector<DeviceReport> devices;
   std::string recorder_failure, not_started;
+  std::string clock_skew;        ///< the system clock against the receiver's, in words; empty: right
   std::uint64_t rows_dropped{};  ///< the outbox did not take them in time, and memory was full
   std::string rejected_file;
 };

@@ -175,6 +175,7 @@ export class LinkProxy {
 /** `anchord gateway` in a folder of its own, with the feeder for its device. */
 export class GatewayProcess {
   log = '';
+  env = {}; // beside that of the test
   constructor({ to, token, feeder, args = [] }) {
     this.folder = mkdtempSync(join(tmpdir(), 'anchord gateway '));
     this.dataDir = join(this.folder, 'data');
@@ -197,6 +198,7 @@ export class GatewayProcess {
     const args = ['gateway', '--to', this.to, '--data-dir', this.dataDir, '--token-file', this.tokenFile];
     this.child = spawn(binary, [...args, '--listen', '127.0.0.1:0', ...this.args, ...extra], {
       stdio: ['ignore', 'pipe', 'pipe'],
+      env: { ...process.env, ...this.env },
     });
     const child = this.child;
     for (const stream of [child.stdout, child.stderr])

@@ -15,6 +15,7 @@ import {
   storedNumbers,
 } from './gateway.mjs';
 import { linkOffThenSlow } from './gateway_link.mjs';
+import { clockAhead } from './other_clock.mjs';
 import { eventually, startServer } from './server.mjs';
 
 const sleep = (ms) => new Promise((done) => setTimeout(done, ms));
@@ -374,6 +375,23 @@ test('without a server at the start rows wait for their mission, which a person 
     assert.equal(code, 0);
     assert.match(stdout, new RegExp(`mission +${mission} \\(given\\)`));
     assert.match(stdout, /200 kept, 200 accepted/);
+  }));
+
+test('a clock that is not the server’s is said, with how far it is off, until it is set', () =>
+  rig(async ({ gateway, feeder }) => {
+    gateway.env = clockAhead(7200);
+    await gateway.start();
+    const told = await eventually('it says so', async () =>
+      (await gateway.status()).alarms.find((alarm) => alarm.code === 'gateway.clock'),
+    );
+    const [, off_s] = /^the clock of this machine is (\d+) s ahead of the server's.*\(NTP\)$/.exec(told.text);
+    assert.ok(off_s > 7190 && off_s <= 7200, told.text);
+    await gateway.kill('SIGTERM');
+    gateway.env = {};
+    await gateway.start();
+    await eventually('the tag is there', () => feeder.connected);
+    await eventually('the server answers', async () => (await gateway.status()).link.state === 'up');
+    assert.deepEqual(await gateway.alarms(), []);
   }));
 
 test('its metrics are well formed, and its pages are for this machine alone', () =>

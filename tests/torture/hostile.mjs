@@ -10,12 +10,10 @@ import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { after, before, test } from 'node:test';
 import { hall_outline, ndjson } from '../e2e/flight.mjs';
+import { faketime, otherClock } from '../e2e/other_clock.mjs';
 import { free_udp_port } from '../e2e/ports.mjs';
 import { binary, eventually, startServer } from '../e2e/server.mjs';
 
-const FAKETIME = ['x86_64', 'aarch64']
-  .map((cpu) => `/usr/lib/${cpu}-linux-gnu/faketime/libfaketimeMT.so.1`)
-  .find(existsSync);
 const sleep = (ms) => new Promise((done) => setTimeout(done, ms));
 
 let folder,
@@ -125,12 +123,11 @@ const fillDisk = (full) =>
 before(async () => {
   folder = mkdtempSync(join(tmpdir(), 'anchord e2e '));
   stepClock('+0d');
-  assert.ok(FAKETIME, 'libfaketime is not installed (package libfaketime)');
+  assert.ok(faketime, 'libfaketime is not installed (package libfaketime)');
   const env = {
-    LD_PRELOAD: FAKETIME,
+    ...otherClock(),
     FAKETIME_TIMESTAMP_FILE: join(folder, 'clock'),
     FAKETIME_CACHE_DURATION: '1',
-    FAKETIME_DONT_FAKE_MONOTONIC: '1',
   };
   const mavlink = await free_udp_port();
   server = await startServer({ auth: 'on', args: ['--drone-address', `udp://:${mavlink}`], env });

@@ -3,12 +3,10 @@ import { execFileSync, spawn } from 'node:child_process';
 import { appendFileSync, chownSync, existsSync, mkdirSync, readlinkSync, rmSync, writeFileSync } from 'node:fs';
 import { createInterface } from 'node:readline';
 import { join } from 'node:path';
+import { clockAhead, faketime } from '../e2e/other_clock.mjs';
 import { binary, eventually } from '../e2e/server.mjs';
 
-const programs = '/usr/lib/postgresql/15/bin',
-  faketime = ['x86_64', 'aarch64']
-    .map((cpu) => `/usr/lib/${cpu}-linux-gnu/faketime/libfaketimeMT.so.1`)
-    .find(existsSync);
+const programs = '/usr/lib/postgresql/15/bin';
 export const k_addresses = {
   h: '10.77.0.1',
   s1: '10.77.0.2',
@@ -307,12 +305,7 @@ class Service {
   }
   start() {
     const env = { ...process.env, ...this.env };
-    if (this.clock_s !== 0)
-      Object.assign(env, {
-        LD_PRELOAD: faketime,
-        FAKETIME: `${this.clock_s > 0 ? '+' : ''}${this.clock_s}s`,
-        FAKETIME_DONT_FAKE_MONOTONIC: '1',
-      });
+    if (this.clock_s !== 0) Object.assign(env, clockAhead(this.clock_s));
     const child = started([...this.network.within(this.machine), binary, ...this.words()], {
       stdio: ['ignore', 'pipe', 'pipe'],
       env,

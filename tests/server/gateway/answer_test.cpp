@@ -57,6 +57,20 @@ TEST(GatewayAnswer, WaitsAsLongAsTheServerSays) {
   EXPECT_GE(of(507, "{}").wait.value(), seconds(5));
 }
 
+TEST(GatewayAnswer, TellsHowFarTheClockHereIsFromTheServersAndNotWhatTheDelayMayBe) {
+  const auto at = [](std::string_view time) { return parse_rfc3339(time).value(); };
+  const std::map<std::string, std::string> date{{"date", "Mon, 04 May 2026 10:11:12 GMT"}};
+  const auto ahead_s = [&](std::string_view sent, std::string_view received) {
+    return clock_ahead_s(date, at(sent), at(received));
+  };
+  EXPECT_EQ(ahead_s("2026-05-04T12:11:13Z", "2026-05-04T12:11:14Z"), 7200);
+  EXPECT_EQ(ahead_s("2026-05-04T08:11:11Z", "2026-05-04T08:11:12Z"), -7200);
+  EXPECT_EQ(ahead_s("2026-05-04T10:11:12.9Z", "2026-05-04T10:11:12.95Z"), 0) << "a date has whole seconds";
+  EXPECT_EQ(ahead_s("2026-05-04T10:11:00Z", "2026-05-04T10:11:30Z"), 0) << "the answer took half a minute";
+  EXPECT_EQ(clock_ahead_s({{"date", "today"}}, k_now, k_now), std::nullopt);
+  EXPECT_EQ(clock_ahead_s({}, k_now, k_now), std::nullopt);
+}
+
 TEST(GatewayAnswer, SaysWhatToDoAboutATokenThatIsNotTaken) {
   for (const int status : {401, 403}) {
     const auto refused = of(status, R"({"detail":"no"})");
