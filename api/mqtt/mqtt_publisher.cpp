@@ -19,7 +19,8 @@ namespace {
 using Ordered = nlohmann::ordered_json;
 
 /// How old names, sites of anchors and what later flights said of them may be.
-constexpr double k_refresh_s = 30;
+constexpr double k_refresh_s = 30, k_refresh_shared_s = 5;
+constexpr double k_rest_times = 20;  ///< as long as reading all anchors took
 constexpr std::size_t k_most_sites = 10'000;
 constexpr std::size_t k_id_length = 36, k_id_end = 12;
 
@@ -45,6 +46,7 @@ std::vector<BrokerMessage> MqttPublisher::changes(bool everything) {
   // What fails in one must not keep the others back, nor end the connection.
   (void)guarded("mqtt alarms", [&] { alarms(out); });
   (void)guarded("mqtt anchors", [&] { anchors(out); });
+  clear_renamed(out);
   (void)guarded("mqtt missions", [&] { missions(out); });
   (void)guarded("mqtt estimates", [&] { estimates(out); });
   return out;
@@ -69,12 +71,25 @@ void MqttPublisher::alarms(Messages& out) {
 void MqttPublisher::name_sites() {
   const auto sites = deps_.sites.sites(k_most_sites, {}, {});
   if (!sites) return;
-  levels_.clear();
+  const auto before = std::exchange(levels_, {});
   std::set<std::string> taken;
   for (const auto& site : sites.value()) {
     std::string name = topic_level(site.name);
     if (!taken.insert(name).second) name += '~' + to_string(site.id).substr(k_id_length - k_id_end);
     levels_[site.id] = std::move(name);
+  }
+  for (const auto& [site, name] : before) {
+    const auto now = levels_.find(site);
+    if (now == levels_.end() || now->second != name) renamed_.push_back(deps_.prefix + '/' + name);
+  }
+}
+
+/// Of a site that has another name now: what was published of its flight goes, and comes anew.
+void MqttPublisher::clear_renamed(Messages& out) {
+  for (const auto& where : std::exchange(renamed_, {})) {
+    if (newest_.erase(where) > 0) forget(out, where + "/mission", false);
+    for (const auto& topic : std::exchange(estimates_[where], {})) forget(out, topic, false);
+    missions_seq_ = estimates_seq_ = 0;
   }
 }
 
@@ -90,12 +105,23 @@ void MqttPublisher::forget(Messages& out, const std::string& topic, bool at_leas
   sent_.erase(topic);
 }
 
-/// All published anchors when a revision came, and every half minute what else is said of them.
+/// When all published anchors are read again: a revision came, or what is stored of them changed (names,
+/// sites, retirements). Where others write too that cannot be told, nor can what the watch of contradictions
+/// finds: after some seconds.
+bool MqttPublisher::is_due(bool revision_came, const std::optional<std::uint64_t>& stored) const {
+  if (revision_came || !refreshed_) return true;
+  const double since_s = seconds_between(*refreshed_, deps_.steady.now());
+  if (stored && stored != stored_ && since_s >= rest_s_) return true;
+  return since_s >= std::max(rest_s_, stored ? k_refresh_s : k_refresh_shared_s);
+}
+
 void MqttPublisher::anchors(Messages& out) {
-  const SteadyTime now = deps_.steady.now();
   const auto came = deps_.hub.newest(Topic::revisions, revisions_seq_);
-  if (!came && refreshed_ && seconds_between(*refreshed_, now) < k_refresh_s) return;
-  refreshed_ = now;
+  const auto stored = deps_.revisions.changes();
+  if (!is_due(came.has_value(), stored)) return;
+  const SteadyTime began = deps_.steady.now();
+  refreshed_ = began;
+  stored_ = stored;
   if (came) revisions_seq_ = came->seq;
   name_sites();
   site_of_.clear();
@@ -108,6 +134,7 @@ void MqttPublisher::anchors(Messages& out) {
     put(out, topic, to_wire(anchor_feature_json(feature)), true);
     there.insert(std::move(topic));
   }
+  rest_s_ = k_rest_times * seconds_between(began, deps_.steady.now());
   const auto& revision = newest.value().front();
   put(out, deps_.prefix + "/_server/revision",
       to_wire(Ordered{{"revision", revision.number},

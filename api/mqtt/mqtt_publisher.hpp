@@ -53,10 +53,12 @@ class MqttPublisher final : public BrokerSource {
   using Messages = std::vector<BrokerMessage>;
   void put(Messages& out, const std::string& topic, std::string_view payload, bool at_least_once);
   void alarms(Messages& out);
+  bool is_due(bool revision_came, const std::optional<std::uint64_t>& stored) const;
   void anchors(Messages& out);
   void missions(Messages& out);
   void estimates(Messages& out);
   void name_sites();
+  void clear_renamed(Messages& out);
   std::string level(const std::optional<SiteId>& site);
   /// PREFIX/SITE where this mission is the site's newest; none: it is an older one.
   std::optional<std::string> place(const MissionId& mission);
@@ -68,11 +70,14 @@ class MqttPublisher final : public BrokerSource {
   std::map<MissionId, std::optional<SiteId>> site_of_;
   std::map<std::string, MissionId> newest_;  ///< of each PREFIX/SITE; survives a connection
   std::vector<std::string> superseded_;      ///< PREFIX/SITE with a new mission: its estimates go
+  std::vector<std::string> renamed_;         ///< PREFIX/SITE of before, of a site with another name now
   // What the broker keeps of us, over connections.
   std::set<std::string> anchors_;                           ///< topics
   std::map<std::string, std::set<std::string>> estimates_;  ///< topics by PREFIX/SITE
   std::uint64_t alarms_seq_{0}, missions_seq_{0}, estimates_seq_{0}, revisions_seq_{0};
   std::optional<SteadyTime> refreshed_{};
+  std::optional<std::uint64_t> stored_{};  ///< RevisionStore::changes() before the anchors were read
+  double rest_s_{0};                       ///< before they are read again for less than a revision
 };
 
 }  // namespace anchord::api

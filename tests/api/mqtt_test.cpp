@@ -161,6 +161,28 @@ TEST_F(MqttPublisher, PublishesAnchorsWithARevisionAndForgetsThoseThatMoved) {
   EXPECT_EQ(got.size(), 2u);
 }
 
+TEST_F(MqttPublisher, MovesAllOfASiteAsSoonAsItHasAnotherName) {
+  changes(true);
+  revision();
+  const auto hall = site("Hall");
+  publish(0x6a2f, hall);
+  estimate(flight(hall), 0x6a2f, R"({"h95_m":0.2})");
+  auto got = changes();
+  for (const auto* topic : {"anchors/0x6a2f", "estimates/0x6a2f", "mission"})
+    EXPECT_EQ(got.count(std::string("plant/uwb/Hall/") + topic), 1u) << topic;
+  (void)changes();
+  EXPECT_TRUE(changes().empty());
+  const auto path = "/api/v1/sites/" + hall;
+  Call options;
+  options.headers = {{"if-match", header(get(path), "ETag")}};
+  EXPECT_EQ(call(api::Method::patch, path, R"({"name":"Hall 2"})", options).status, 200);
+  got = changes();
+  for (const auto* topic : {"anchors/0x6a2f", "estimates/0x6a2f", "mission"}) {
+    EXPECT_EQ(got.at(std::string("plant/uwb/Hall/") + topic), "") << topic;
+    EXPECT_NE(got.at(std::string("plant/uwb/Hall 2/") + topic), "") << topic;
+  }
+}
+
 TEST(MqttStatus, IsAnAlarmOnceTheBrokerIsAwayForTenSeconds) {
   BrokerStatus status{.connected = false, .address = "plant:8883", .tls = true, .reason = "no route"};
   EXPECT_EQ(api::broker_alarm(status), "");
