@@ -54,9 +54,22 @@ struct Owned {
 constexpr double k_max_datum_error_m = 0.5;
 /// A frame that moves shows it between these years; plates move by up to 0.1 m a year.
 constexpr std::array k_years{2010.0, 2030.0};
+constexpr int k_wgs84_flat = 4326, k_wgs84_full = 4979, k_etrs89_full = 4937;
 constexpr double k_max_unstated_move_m = 0.02, k_metres_a_degree = 111'195;
 
 std::string code(int epsg) { return "EPSG:" + std::to_string(epsg); }
+
+/// WGS 84 has been kept at the ITRF of its day since 2012, to 2 cm (G1674 at ITRF2008, G2139 at ITRF2014 as
+/// IGb14, G2296 at ITRF2020; NGA.STND.0036). PROJ gives one error of 2 m for all that was ever called WGS 84.
+bool is_wgs84_of_today(PJ_CONTEXT* context, const PJ* map, int geographic_epsg) {
+  constexpr std::array k_today{7911, 7912, 9989, 9018};
+  if (std::ranges::find(k_today, geographic_epsg) == k_today.end()) return false;
+  const Owned base{proj_crs_get_geodetic_crs(context, map)},
+      wgs84{proj_create(context, code(k_wgs84_flat).c_str())};
+  return base.pj != nullptr && wgs84.pj != nullptr &&
+         proj_is_equivalent_to_with_ctx(context, base.pj, wgs84.pj,
+                                        PJ_COMP_EQUIVALENT_EXCEPT_AXIS_ORDER_GEOGCRS) != 0;
+}
 
 /// What keeps numbers of a map system from being metres east and north; empty where they are. Both axes of a
 /// polar system point north, or both south.
@@ -167,6 +180,7 @@ Result<Projection> Projection::open(int epsg, int geographic_epsg, std::optional
   const Owned source{proj_create(context, code(geographic_epsg).c_str())};
   if (target.pj == nullptr) return make_error(Errc::not_found, "PROJ does not know " + code(epsg));
   if (source.pj == nullptr) return make_error(Errc::not_found, "PROJ does not know " + code(geographic_epsg));
+  if (is_wgs84_of_today(context, target.pj, geographic_epsg)) return open(epsg, k_wgs84_full, epoch_year);
   const char* given = proj_get_name(target.pj);
   std::string name = given != nullptr ? given : code(epsg);
   if (proj_get_type(target.pj) != PJ_TYPE_PROJECTED_CRS)
@@ -193,7 +207,6 @@ Result<Projection> Projection::open(int epsg, int geographic_epsg, std::optional
 }
 
 Result<Projection> Projection::open_own(int epsg) {
-  constexpr int k_wgs84_3d = 4979, k_etrs89_3d = 4937;
   const Transformation own;
   const Owned target{proj_create(own.context, code(epsg).c_str())};
   const Owned base{target.pj != nullptr ? proj_crs_get_geodetic_crs(own.context, target.pj) : nullptr};
@@ -204,8 +217,8 @@ Result<Projection> Projection::open_own(int epsg) {
                                        PJ_COMP_EQUIVALENT_EXCEPT_AXIS_ORDER_GEOGCRS) != 0)
       return open(epsg, known.full_epsg);
   }
-  auto opened = open(epsg, k_wgs84_3d);
-  return opened || opened.error().code != Errc::unsupported ? std::move(opened) : open(epsg, k_etrs89_3d);
+  auto opened = open(epsg, k_wgs84_full);
+  return opened || opened.error().code != Errc::unsupported ? std::move(opened) : open(epsg, k_etrs89_full);
 }
 
 const std::string& Projection::unusable() const { return pipeline_->unusable; }

@@ -158,6 +158,27 @@ TEST(Projection, AsksForTheEpochOfAFrameThatMoves) {
   EXPECT_NE(at.error().message.find("crs.epoch"), std::string::npos) << at.error().message;
 }
 
+// WGS 84 is kept at the ITRF to 2 cm: expected are the figures of GeographicLib's TransverseMercator for WGS
+// 84 itself, in whatever year.
+TEST(Projection, TakesAMapInWgs84ForAFrameOfTheItrfAsItIsAndForNoOther) {
+  const Wgs84 place{51.0231, 3.7133, 55};
+  int zone = 0;
+  bool north = false;
+  double easting_m = 0, northing_m = 0;
+  GeographicLib::UTMUPS::Forward(place.lat_deg, place.lon_deg, zone, north, easting_m, northing_m);
+  for (const int itrf : {7911, 7912, 9989, 9018})
+    for (const auto& year : {std::optional<double>(), std::optional(2026.9)}) {
+      const auto map = Projection::open(32631, itrf, year);
+      ASSERT_TRUE(map.has_value()) << itrf << map.error().message;
+      const auto at = map.value().easting_northing_m(place);
+      ASSERT_TRUE(at.has_value()) << itrf << at.error().message;
+      EXPECT_NEAR(at.value().x(), easting_m, 1e-6) << itrf;
+      EXPECT_NEAR(at.value().y(), northing_m, 1e-6) << itrf;
+    }
+  EXPECT_FALSE(Projection::open(32631, 4937).value().easting_northing_m(place).has_value())
+      << "ETRS89 is 0.8 m away";
+}
+
 /// A geoid of one height in GeographicLib's PGM format: raw = (height - offset) / scale.
 void write_geoid(const std::filesystem::path& file, double height_m) {
   std::ofstream out(file, std::ios::binary);
