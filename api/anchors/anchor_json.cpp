@@ -116,6 +116,14 @@ std::string number(double value, int decimals) {
 
 }  // namespace
 
+UtcTime newest_calibration(std::span<const AnchorFeature> anchors) {
+  UtcTime newest{};
+  for (const auto& feature : anchors) {
+    if (feature.calibrated && newest < *feature.calibrated) newest = *feature.calibrated;
+  }
+  return newest;
+}
+
 std::optional<GlobeAccuracy> map_accuracy(const AnchorFeature& feature) {
   if (feature.globe) return feature.globe;
   if (!feature.estimate || !feature.estimate->best) return std::nullopt;

@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <nlohmann/json_fwd.hpp>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -56,6 +57,9 @@ struct AnchorFeature {
   std::optional<double> height_orthometric_m{};
   std::string geoid;  ///< its name, or why there is none
 };
+/// The time that files of these anchors bear: that of making would make two files of the same differ. 1970 of
+/// none.
+UtcTime newest_calibration(std::span<const AnchorFeature> anchors);
 /// Of the place the map shows: with the frame's fit where one gave it. For writers of one figure each.
 std::optional<GlobeAccuracy> map_accuracy(const AnchorFeature& feature);
 nlohmann::ordered_json anchor_feature_json(const AnchorFeature& feature);

@@ -80,7 +80,7 @@ std::string bytes_of(ExchangeApi& s, std::string_view format, const Anchors& anc
   if (format == "kml") return anchors_kml(anchors);
   if (format == "gpkg")
     return value_or_problem(
-        s.geopackage(anchor_tables(anchors, s.missions, s.measurements), s.anchors.clock.now()));
+        s.geopackage(anchor_tables(anchors, s.missions, s.measurements), newest_calibration(anchors)));
   if (format == "dxf") return anchors_dxf(anchors, checked_height(anchors, request));
   if (format == "ifc") return anchors_ifc(anchors, checked_height(anchors, request));
   if (format == "pnezd") return anchors_pnezd(anchors, checked_height(anchors, request));

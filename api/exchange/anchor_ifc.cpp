@@ -213,16 +213,6 @@ class Model {
   std::map<std::string, InSite> sites_;
 };
 
-/// When the newest of them was calibrated: the time of making would make two files of the same anchors
-/// differ.
-std::string time_of(std::span<const AnchorFeature> anchors) {
-  UtcTime newest{};
-  for (const auto& feature : anchors) {
-    if (feature.calibrated && newest < *feature.calibrated) newest = *feature.calibrated;
-  }
-  return to_rfc3339(newest).substr(0, 19);
-}
-
 }  // namespace
 
 std::string anchors_ifc(std::span<const AnchorFeature> anchors, FileHeight height) {
@@ -231,7 +221,7 @@ std::string anchors_ifc(std::span<const AnchorFeature> anchors, FileHeight heigh
   for (const auto& feature : anchors) model.add(feature, height);
   return "ISO-10303-21;\r\nHEADER;\r\nFILE_DESCRIPTION(('ViewDefinition [ReferenceView_V1.2]'),'2;1');\r\n"
          "FILE_NAME('anchors.ifc'," +
-         text(time_of(anchors)) +
+         text(to_rfc3339(newest_calibration(anchors)).substr(0, 19)) +
          ",(''),(''),'anchord','anchord','');\r\nFILE_SCHEMA(('IFC4'));\r\nENDSEC;\r\nDATA;\r\n" +
          model.finished() + "ENDSEC;\r\nEND-ISO-10303-21;\r\n";
 }

@@ -230,6 +230,18 @@ TEST_F(AnchorFiles, AreThePublishedOnesWhole) {
   EXPECT_EQ(name, "attachment; filename=\"anchors.gpkg\"");
 }
 
+TEST_F(AnchorFiles, OfTheSameAnchorsAreTheSameHoweverLateTheyAreAskedFor) {
+  publish(true);
+  for (const char* format : {"kml", "gpkg", "dxf", "ifc", "pnezd"}) {
+    clock_.ahead_s = 0;
+    const auto first = file(format);
+    ASSERT_EQ(first.status, 200) << format << first.body;
+    clock_.ahead_s = 3600;
+    EXPECT_EQ(file(format).body, first.body) << format;
+    EXPECT_EQ(header(file(format), "ETag"), header(first, "ETag")) << format;
+  }
+}
+
 TEST_F(AnchorFiles, OfNothingPublishedAreEmptyAndValid) {
   EXPECT_EQ(file("pnezd").body, "");
   EXPECT_EQ(json(file("pozyx")), Json::array());
