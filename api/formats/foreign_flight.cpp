@@ -45,6 +45,9 @@ std::string row_text(const ForeignTable& table, std::size_t row, const std::stri
 std::string no_time(std::string_view cell) {
   return '"' + to_utf8(cell, 40) + "\" is not a time that can be read (like 2026-05-04 10:00:01.5)";
 }
+std::string no_number(std::string_view cell) {
+  return '"' + to_utf8(cell, 40) + "\" is not a number that can be read";
+}
 
 std::string time_text(std::size_t row, const Cells::At& time, const Cells::At& zone, const TimeReading& how) {
   return how.unit == TimeUnit::date ? with_zone(time.text(row), zone.text(row)) : std::string(time.text(row));
@@ -187,12 +190,13 @@ Result<void> read_ranges(const ForeignTable& table, const Reading& reading, cons
       std::swap(who, of);
       ++n_turned;
     }
-    const std::string wrong = to_tag && is_tag(who) ? "a range between two tags"
-                              : of.empty()          ? "no tag"
-                              : who.empty()         ? "no anchor"
-                              : !us                 ? no_time(moment)
-                              : !metres             ? "no range"
-                                                    : "";
+    const std::string wrong = to_tag && is_tag(who)        ? "a range between two tags"
+                              : of.empty()                 ? "no tag"
+                              : who.empty()                ? "no anchor"
+                              : !us                        ? no_time(moment)
+                              : distance.text(row).empty() ? "no range"
+                              : !metres                    ? no_number(distance.text(row))
+                                                           : "";
     if (!wrong.empty()) {
       out.refused.push_back(row_text(table, row, wrong));
       continue;

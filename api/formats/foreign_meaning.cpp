@@ -60,6 +60,22 @@ double north_deg(double value, HeadingKind kind) {
   return std::fmod(std::fmod(from_east ? 90 - degrees : degrees, 360) + 360, 360);
 }
 
+bool has_thousands(const ForeignTable& table, std::string_view column) {
+  constexpr std::size_t k_group = 3;
+  bool separated = false;
+  for (const auto cell : table.sample(column)) {
+    if (cell.empty()) continue;
+    const auto head = std::min(cell.find_first_of(".,"), cell.size());
+    if (head == 0 || head > k_group || (cell.size() - head) % (k_group + 1) != 0) return false;
+    for (std::size_t i = 0; i < cell.size(); ++i) {
+      const bool at_separator = i >= head && (i - head) % (k_group + 1) == 0;
+      if (at_separator ? cell[i] != '.' && cell[i] != ',' : cell[i] < '0' || cell[i] > '9') return false;
+    }
+    separated = separated || head < cell.size();
+  }
+  return separated;
+}
+
 bool may_be_hexadecimal(const ForeignTable& table, std::string_view column, std::string_view given) {
   bool letter = is_hex(given) && has_letter(given);
   const auto at = table.column(column);

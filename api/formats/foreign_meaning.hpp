@@ -31,6 +31,10 @@ inline constexpr auto k_address_kind_words =
 bool may_be_hexadecimal(const ForeignTable& table, std::string_view column, std::string_view given = {});
 ForeignId foreign_id(std::string_view text, AddressKind kind);
 
+/// Whether each number of a column is written as thousands are, "12.345" or "985", and one has more than
+/// three digits.
+bool has_thousands(const ForeignTable& table, std::string_view column);
+
 /// The column of N and S, or E and W, that a latitude or a longitude needs: by its name, or right beside it.
 std::optional<std::string> hemisphere_column(const ForeignTable& table, const ForeignColumns& columns,
                                              std::string_view field);

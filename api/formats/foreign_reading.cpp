@@ -33,6 +33,12 @@ void read_units(const ForeignTable& track, const ForeignTable& ranges, const For
     }
   };
   if (!o.range_unit) look(ranges, r.rc, "range", &r.range_per_metre);
+  const auto range = column_of(r.rc, "range");
+  if (r.range_per_metre != 1 && has_thousands(ranges, range) && r.contradiction.empty())
+    r.contradiction = ranges.name() + ": the column '" + std::string(range) + "' is in " +
+                      (r.range_per_metre == 1000 ? "mm" : "cm") +
+                      " and all of it is written as thousands are, with a point or comma before three "
+                      "digits: write it without";
   if (!o.height_unit) look(track, r.tc, r.local ? "z" : "height", &r.height_per_metre);
   for (const char* field : {"separation", "x", "y"}) look(track, r.tc, field, nullptr);
 }

@@ -225,6 +225,9 @@ std::optional<std::size_t> ForeignTable::column(std::string_view name) const {
 
 double ForeignTable::number(std::string_view cell) const {
   std::array<char, 64> changed{};
+  // Beside decimal commas a point stands between thousands: "12.345" is not 12.345.
+  if (decimal_comma_ && cell.find('.') != std::string_view::npos)
+    return std::numeric_limits<double>::quiet_NaN();
   if (decimal_comma_ && cell.size() < changed.size()) {
     std::ranges::copy(cell, changed.begin());
     const auto comma = cell.find(',');

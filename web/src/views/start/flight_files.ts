@@ -16,7 +16,7 @@ import {
   type HeadingKind,
 } from './meaning';
 import { height_unit_of, heights_of, place_kind, type Heights } from './places';
-import { MOST_LOCAL_M, number_of, type Table } from './table_file';
+import { has_thousands, MOST_LOCAL_M, number_of, type Table } from './table_file';
 import {
   fix_numbers,
   fix_of,
@@ -112,6 +112,7 @@ export function guessed_reading(
     crs = declared?.crs ?? (kind === 'map' ? null : kind === 'ecef' ? 'ECEF' : ''),
     track_time = time_reading(track, tc.time),
     of_ranges = unit_column(ranges, rc, 'range'),
+    range = of_ranges?.unit ?? range_unit(ranges, rc.range),
     of_heights = unit_column(track, tc, is_local(tc) ? 'z' : 'height'),
     others = (['separation', 'x', 'y'] as const).map((f) => [f, unit_column(track, tc, f)] as const),
     wrong =
@@ -123,7 +124,7 @@ export function guessed_reading(
   return {
     track_time,
     range_time: same_time(track, tc, ranges, rc) ? track_time : time_reading(ranges, rc.time),
-    range: of_ranges?.unit ?? range_unit(ranges, rc.range),
+    range,
     fix: tc.fix === undefined ? 'words' : fix_numbers(track, tc.fix, declared !== null),
     crs,
     axes: declared || !is_local(tc) || kind === 'ecef' ? 'enu' : track_axes(track, tc, crs === ''),
@@ -137,7 +138,9 @@ export function guessed_reading(
     addresses: may_be_hexadecimal(ranges, rc.anchor) || may_be_hexadecimal(ranges, rc.tag) ? null : 'names',
     wrong_unit: wrong
       ? `${wrong[0].name}: the column '${wrong[2].name}' says that '${wrong[1]}' is in ${wrong[2].word}: write it in metres`
-      : '',
+      : range !== 'm' && has_thousands(ranges, rc.range)
+        ? `${ranges.name}: the column '${rc.range}' is in ${range} and all of it is written as thousands are, with a point or comma before three digits: write it without`
+        : '',
   };
 }
 /// One column of one file, whose unit is the same for its track and its ranges.
@@ -447,9 +450,11 @@ function ranges_of(
           ? 'no anchor'
           : !Number.isFinite(t_us)
             ? `"${time(row)}" is not a time that can be read (like 2026-05-04 10:00:01.5)`
-            : !Number.isFinite(distance)
+            : range!(row) === ''
               ? 'no range'
-              : '';
+              : !Number.isFinite(distance)
+                ? `"${range!(row)}" is not a number that can be read`
+                : '';
     if (wrong) {
       refused.push(`${t.name} row ${i + 2}: ${wrong}`);
       return [];

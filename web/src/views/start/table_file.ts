@@ -116,7 +116,8 @@ export function table_of(name: string, whole: string): Table {
 
 /// NaN where it is none; also for nothing at all.
 export function number_of(cell: string, decimal: '.' | ','): number {
-  if (cell === '') return NaN;
+  // Beside decimal commas a point stands between thousands: "12.345" is not 12.345.
+  if (cell === '' || (decimal === ',' && cell.includes('.'))) return NaN;
   return Number(decimal === ',' ? cell.replace(',', '.') : cell);
 }
 /// A column's first values, as they show what it is.
@@ -128,6 +129,11 @@ export const numbers_of = (t: Table, column: string | undefined): readonly numbe
     .map((x) => number_of(x, t.decimal))
     .filter(Number.isFinite);
 export const beyond = (values: readonly number[], most: number): boolean => values.some((v) => Math.abs(v) > most);
+/// Whether numbers are written as thousands are, "12.345" or "985", each that has digits after a sign with three of them.
+export function has_thousands(t: Table, column: string | undefined): boolean {
+  const cells = sample_of(t, column).filter((c) => c !== '');
+  return cells.some((c) => /[.,]/.test(c)) && cells.every((c) => /^\d{1,3}([.,]\d{3})*$/.test(c));
+}
 /// Metres from zero beyond which a frame is none of its own, as of the rows of the API.
 export const MOST_LOCAL_M = 1e5;
 /// What columns of latitude and longitude hold: degrees, whole numbers of 1e-7 degrees, or something else.
