@@ -367,6 +367,7 @@ void FlightEngine::monitor(double now_s) {
   auto alarm = watch(limits, now);
   // A position that is not known any more agrees with nothing.
   if (!alarm && alarm_ && alarm_->id == "position.disagree" && !now.autopilot_m) alarm = alarm_;
+  if (alarm && alarm->climbs) alarm->text += taken_over_ ? ": climb" : ": climbing";
   if (taken_over_) {
     if (alarm && (!alarm_ || alarm_->id != alarm->id))
       report(now_s, EventLevel::critical, alarm->id, alarm->text);

@@ -164,9 +164,8 @@ std::optional<Alarm> watch(const SafetyLimits& limits, const Situation& now) {
   if (now.position_m && now.position_age_s <= limits.position_age_s) {
     const auto floor_m = limits.bounds.min_height_m;
     if (now.floor && floor_m && now.position_m->z() < *floor_m - limits.floor_tolerance_m) {
-      return Alarm{
-          Reaction::hold, true, "fence.breach",
-          sentence("%.1f m high, the height band begins at %.1f m: climbing", now.position_m->z(), *floor_m)};
+      return Alarm{Reaction::hold, true, "fence.breach",
+                   sentence("%.1f m high, the height band begins at %.1f m", now.position_m->z(), *floor_m)};
     }
     if (auto alarm = breach(limits, *now.position_m)) return alarm;
   }

@@ -67,6 +67,8 @@ void Session::forget_vehicle() {
   sent_.clear();
   telemetry_ = Telemetry();
   lists_lost("another aircraft is on the link since");
+  for (const auto& [list, up] : std::exchange(waiting_, {}))
+    report(up.number, "upload", CommandState::unconfirmed, "another aircraft is on the link now");
   if (transfer_) {
     transfer_->check = false;
     end_transfer(CommandState::unconfirmed, "another aircraft is on the link now");

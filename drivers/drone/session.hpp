@@ -74,8 +74,9 @@ class Session final : public Drone {
   DroneStatus status() const override;
   std::vector<CommandReport> take_reports() override;
 
-  /// Whole lists; one transfer at a time. Its end is a report named upload or download.
-  std::uint64_t upload(ItemList list, std::vector<MissionItem> items);
+  /// Whole lists; one transfer at a time, for which the newest upload of each list waits. Its end is a report
+  /// named upload or download. check: it is read back, and accepted only where that is the same.
+  std::uint64_t upload(ItemList list, std::vector<MissionItem> items, bool check = false);
   std::uint64_t download(ItemList list);
   const std::vector<MissionItem>& downloaded() const { return items_; }
   const mavlink::Framer::Counters& counters() const { return framer_.counters(); }
@@ -187,13 +188,14 @@ class Session final : public Drone {
   void drive_target();
   void drive_speed();
   void drive_transfer();
+  void next_transfer();
+  void replaced(std::uint64_t number, ItemList list);
   void repeat_commands();
   double distance_m(double lat_deg, double lon_deg, double height_m) const;
   mavlink::Message target_message(double lat_deg, double lon_deg, double height_m,
                                   std::optional<double> heading_deg) const;
   mavlink::Message addressed(std::string_view name) const;
   void send_item(std::size_t index);
-  std::uint64_t upload_checked(ItemList list, std::vector<MissionItem> items);
   void end_transfer(CommandState state, std::string text);
 
   SessionOptions options_;
@@ -213,6 +215,7 @@ class Session final : public Drone {
   std::deque<Sent> sent_;
   std::optional<Flight> flight_;
   std::optional<Transfer> transfer_;
+  std::map<ItemList, Transfer> waiting_;    ///< uploads, until the running transfer has ended
   std::map<ItemList, std::uint64_t> kept_;  ///< the upload that the autopilot has of each list, read back
   std::vector<MissionItem> items_;
   std::vector<CommandReport> reports_;

@@ -1,4 +1,5 @@
 // Mission and fence lists of a Session: MISSION_COUNT, MISSION_REQUEST_INT, MISSION_ITEM_INT, MISSION_ACK.
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -93,43 +94,49 @@ std::uint64_t Session::upload_route(const std::vector<RoutePoint>& route) {
     items.back().p4 = point.heading_deg.value_or(std::nan(""));
     items.back().z = point.height_m;
   }
-  return upload_checked(ItemList::mission, std::move(items));
+  return upload(ItemList::mission, std::move(items), true);
 }
 
 std::uint64_t Session::upload_fence(const DroneFence& fence) {
   std::vector<MissionItem> items;
   add_area(items, k_fence_inside, fence.inside);
   for (const auto& area : fence.outside) add_area(items, k_fence_outside, area);
-  return upload_checked(ItemList::fence, std::move(items));
+  return upload(ItemList::fence, std::move(items), true);
 }
 
-std::uint64_t Session::upload_checked(ItemList list, std::vector<MissionItem> items) {
+std::uint64_t Session::upload(ItemList list, std::vector<MissionItem> items, bool check) {
+  const std::uint64_t number = ++number_;
   if (!last_seen_s_) {
-    const std::uint64_t number = ++number_;
     deaf(number, "upload");
     return number;
   }
-  const std::uint64_t number = upload(list, std::move(items));
-  if (transfer_ && transfer_->number == number) transfer_->check = true;
+  if (items.size() > k_max_items) {
+    report(number, "upload", CommandState::refused, "more than 1000 items");
+    return number;
+  }
+  if (const auto before = waiting_.extract(list)) replaced(before.mapped().number, list);
+  report(number, "upload", CommandState::sent, list_word(list));
+  Transfer up{number, true, list, std::move(items), 0, 0, 0, 0, check, {}};
+  up.count = up.items.size();
+  up.asked.resize(up.count);
+  waiting_.emplace(list, std::move(up));
+  next_transfer();
   return number;
 }
 
-std::uint64_t Session::upload(ItemList list, std::vector<MissionItem> items) {
-  const std::uint64_t number = ++number_;
-  if (transfer_ || items.size() > k_max_items) {
-    report(number, "upload", CommandState::refused,
-           transfer_ ? "another transfer is running" : "more than 1000 items");
-    return number;
-  }
-  if (const auto before = kept_.extract(list))
-    report(before.mapped(), "upload", CommandState::unconfirmed,
-           "followed by another upload of the " + list_word(list));
-  report(number, "upload", CommandState::sent, list_word(list));
-  transfer_ = Transfer{number, true, list, std::move(items), 0, 0, now_s_ - k_wait_s, 0, false, {}};
-  transfer_->count = transfer_->items.size();
-  transfer_->asked.resize(transfer_->count);
+void Session::replaced(std::uint64_t number, ItemList list) {
+  report(number, "upload", CommandState::unconfirmed, "followed by another upload of the " + list_word(list));
+}
+
+/// Begins the upload that has waited longest, once nothing else is transferred.
+void Session::next_transfer() {
+  if (transfer_ || waiting_.empty()) return;
+  const auto oldest =
+      std::ranges::min_element(waiting_, {}, [](const auto& one) { return one.second.number; });
+  if (const auto before = kept_.extract(oldest->first)) replaced(before.mapped(), oldest->first);
+  transfer_ = std::move(waiting_.extract(oldest).mapped());
+  transfer_->last_s = now_s_ - k_wait_s;
   drive_transfer();
-  return number;
 }
 
 std::uint64_t Session::download(ItemList list) {
@@ -168,6 +175,7 @@ void Session::end_transfer(CommandState state, std::string text) {
     }
   }
   report(done.number, done.up || done.check ? "upload" : "download", state, std::move(text));
+  next_transfer();
 }
 
 void Session::send_item(std::size_t index) {

@@ -204,6 +204,22 @@ TEST_P(EachAutopilot, KeepsTheFenceAndTheRouteItWasGiven) {
   EXPECT_EQ(point.real("param4"), 45);
 }
 
+TEST_P(EachAutopilot, SendsAListOnceTheTransferBeforeItHasEndedAndOfOneListTheNewestAlone) {
+  Pair pair(options());
+  pair.run(3);
+  const auto route =
+      pair.session.upload_route({{{3.7130, 51.0230}, 4, 45, 3}, {{3.7135, 51.0230}, 9, {}, 0}});
+  const auto first = pair.session.upload_fence({k_fence, {}}),
+             fence = pair.session.upload_fence({k_fence, {k_pond}});
+  EXPECT_EQ(pair.last(fence), CommandState::sent);
+  ASSERT_TRUE(pair.run_until([&] { return pair.last(fence) == CommandState::accepted; }, 60))
+      << pair.words(fence);
+  EXPECT_EQ(pair.last(route), CommandState::accepted) << pair.words(route);
+  EXPECT_EQ(pair.last(first), CommandState::unconfirmed);
+  EXPECT_EQ(pair.words(first), "followed by another upload of the fence");
+  EXPECT_EQ(pair.autopilot.fence_list().size(), 7u);
+}
+
 TEST(DroneSession, AnAutopilotWithoutFencesSaysSo) {
   sim::AutopilotOptions old;
   old.keeps_fences = false;
