@@ -139,7 +139,8 @@ export function guessed_reading(
     wrong_unit: wrong
       ? `${wrong[0].name}: the column '${wrong[2].name}' says that '${wrong[1]}' is in ${wrong[2].word}: write it in metres`
       : range !== 'm' && has_thousands(ranges, rc.range)
-        ? `${ranges.name}: the column '${rc.range}' is in ${range} and all of it is written as thousands are, with a point or comma before three digits: write it without`
+        ? `${ranges.name}: the column '${rc.range}' is in ${range} and all of it is written as thousands are, with a point or comma before three ` +
+          'digits: write it without'
         : '',
   };
 }
