@@ -4,7 +4,7 @@ import './start.css';
 import { error_text } from '../../api/client';
 import { idempotency_key } from '../../api/client';
 import { call } from '../../api/contract';
-import { may, of_every_site } from '../../state/session';
+import { may, me, of_every_site } from '../../state/session';
 import { CopyBox } from '../../ui/copy_box';
 
 const SPEED = 4; ///< times real time: a minute to the first positions of anchors
@@ -30,7 +30,8 @@ export function FirstRun() {
       set_busy(false);
     }
   };
-  const url = new URL('.', document.baseURI.split('#')[0]).toString().replace(/\/$/, '');
+  const url = new URL('.', document.baseURI.split('#')[0]).toString().replace(/\/$/, ''),
+    there = `--url ${url}` + (me.value?.auth === 'off' ? '' : ' --token-file TOKEN_FILE');
   return (
     <div class="firstrun" data-help="first" data-testid="first-run">
       <div class="start">
@@ -92,8 +93,14 @@ export function FirstRun() {
         <details>
           <summary>The same on the command line</summary>
           <CopyBox text="anchord simulate flight --seed 7 --out demo-flight" />
-          <CopyBox text={`anchord replay demo-flight --url ${url} --speed 4`} />
-          <CopyBox text="anchord import flight DIR" />
+          <CopyBox text={`anchord replay demo-flight --speed 4 ${there}`} />
+          <CopyBox text={`anchord import flight DIR ${there}`} />
+          {me.value?.auth !== 'off' && (
+            <p>
+              TOKEN_FILE has a token of the roles gateway and operator: System, Access, or{' '}
+              <code>anchord token create</code> makes one.
+            </p>
+          )}
         </details>
       </div>
     </div>
