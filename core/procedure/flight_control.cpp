@@ -256,7 +256,9 @@ void FlightControl::report(double now_s, const CommandReport& r) {
   if (over_ || taken_over_ || r.state == CommandState::sent || r.state == CommandState::accepted) return;
   // What became of an earlier one, of this flight or of the last, says nothing of this.
   if (r.what == "take_off" && r.number == take_off_ && engine_.state().step == Step::take_off) {
-    engine_.not_taken_off(now_s, r.text);
+    // What is in the air has taken off, whatever became of the command: the step goes on, and its time-out
+    // lands it.
+    if (!in_air_) engine_.not_taken_off(now_s, r.text);
   } else if (r.what == "go_to" && r.number == last_target_) {
     if (r.state == CommandState::refused) {
       (void)engine_.command(now_s, Trigger::unreachable, "");

@@ -11,11 +11,12 @@
 namespace anchord::procedure {
 namespace {
 
-constexpr double k_listen_s = 1.0;   ///< least stay in a search, so that every anchor had its turn
-constexpr double k_connect_s = 1.0;  ///< least look at the connections of a point
-constexpr double k_settle_s = 0.5;   ///< at rest this long counts as arrived
-constexpr int k_in_range = 3;        ///< ranges that make an anchor heard
-constexpr double k_late_s = 0.5;     ///< latency and period of telemetry on a poor link
+constexpr double k_listen_s = 1.0;           ///< least stay in a search, so that every anchor had its turn
+constexpr double k_connect_s = 1.0;          ///< least look at the connections of a point
+constexpr double k_settle_s = 0.5;           ///< at rest this long counts as arrived
+constexpr double k_slowest_climb_mps = 1.0;  ///< of an autopilot that takes off
+constexpr int k_in_range = 3;                ///< ranges that make an anchor heard
+constexpr double k_late_s = 0.5;             ///< latency and period of telemetry on a poor link
 constexpr double k_latest_s =
     1.0;  ///< of two positions that are compared; older ones are an alarm of their own
 
@@ -49,6 +50,8 @@ Result<FlightSetup> flight_setup(const Plan& plan, const Eigen::Vector3d& home_m
   out.settings.min_height_m = s.min_height_m;
   out.settings.max_height_m = s.max_height_m;
   out.settings.take_off_m = std::clamp(4.0, s.min_height_m, s.max_height_m);
+  const double climb_m = std::max(out.settings.take_off_m, s.min_height_m - home_m.z());
+  out.settings.take_off_s += std::max(0.0, climb_m) / k_slowest_climb_mps;
   BOOST_OUTCOME_TRY(out.settings.check());
   out.limits.bounds = planning::flight_bounds(local, s);
   out.walls = local.walls;
@@ -267,6 +270,7 @@ void FlightEngine::apply(double now_s, const Advance& step) {
 void FlightEngine::execute(double now_s, const Command& c) {
   switch (c.kind) {
     case Command::Kind::take_off: {
+      if (vehicle_.in_air) return;  // it climbs already: an autopilot refuses a second take-off
       Command up = c;
       up.point_m.z() = climb_to_m_ = take_off_height_m(setup_);
       if (const auto refused = refuse_command(setup_.limits, position_m(), up)) {

@@ -90,6 +90,16 @@ std::optional<Refused> refuse_take_off(const planning::Bounds& bounds, const Eig
   // Straight up from where it stands, which must be inside the fence and outside every no-fly area.
   Eigen::Vector3d above = stands_m;
   above.z() = std::max(height_m, bounds.min_height_m.value_or(height_m));
+  // The plan's heights are above its ground: who has to climb further than they go stands on another ground,
+  // or its height is wrong.
+  const double climb_m = above.z() - stands_m.z();
+  if (bounds.max_height_m && climb_m > *bounds.max_height_m)
+    return Refused{"too_high",
+                   sentence("no take-off from here: %.0f m up to the plan's height band, which ends at %.0f "
+                            "m above its ground:",
+                            climb_m, *bounds.max_height_m) +
+                       sentence(" is the height of the plan's origin right? It is %.0f m above the aircraft",
+                                -stands_m.z())};
   const auto refusal = planning::refuse_point(bounds, above);
   if (!refusal) return std::nullopt;
   return Refused{std::string(planning::to_string(*refusal)),

@@ -385,6 +385,22 @@ TEST(FlightEngine, ATakeOffWhereItIsNotAllowedIsNotFlownAndSaysWhyInMetres) {
       "did not take off: no take-off from here: 2.0 m from the building or a no-fly area, 4.0 m required");
 }
 
+TEST(FlightEngine, WhatClimbsAlreadyIsNotToldToTakeOffAgain) {
+  Flown f;
+  f.view.armed = f.view.in_air = false;
+  f.engine.vehicle(f.now, f.view);
+  f.feed({Trigger::start});
+  ASSERT_EQ(f.engine.take_commands().size(), 1u);
+  f.feed({Trigger::timeout});
+  EXPECT_EQ(f.engine.take_commands().size(), 1u) << "it stands: once more";
+  Flown up;
+  up.feed({Trigger::start});
+  (void)up.engine.take_commands();
+  up.feed({Trigger::timeout});
+  EXPECT_TRUE(up.engine.take_commands().empty());
+  EXPECT_EQ(up.engine.state().step, Step::take_off);
+}
+
 TEST(FlightEngine, TheTimeFlownStandsStillAfterTheLandingAndGoesOnOverARestart) {
   Flown f;
   f.feed({Trigger::start, Trigger::airborne});

@@ -68,6 +68,19 @@ TEST(SafetyGuard, JudgesATakeOff) {
   EXPECT_TRUE(refuse_command(hall(), Vector3d(15, 10, 0), up)) << "inside the hall";
 }
 
+TEST(SafetyGuard, RefusesToClimbFurtherThanThePlanGoesAboveItsGround) {
+  auto bounds = hall().bounds;
+  bounds.min_height_m = 4;
+  bounds.max_height_m = 30;
+  EXPECT_FALSE(refuse_take_off(bounds, Vector3d(-10, -10, -20), 4)) << "a slope";
+  const auto refused = refuse_take_off(bounds, Vector3d(-10, -10, -100), 4);
+  ASSERT_TRUE(refused);
+  EXPECT_EQ(refused->text,
+            "no take-off from here: 104 m up to the plan's height band, which ends at 30 m above its ground: "
+            "is the height of the plan's origin right? "
+            "It is 100 m above the aircraft");
+}
+
 TEST(SafetyWatch, HasTheReactionsOfTheDocumentation) {
   const auto limits = hall();
   EXPECT_FALSE(watch(limits, well()));

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cmath>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -60,9 +61,12 @@ class AirRig {
   }
   std::string reason() const { return control ? control->engine().state().reason : ""; }
 
+  std::function<void(procedure::FlightSetup&)> other;  ///< what this flight has otherwise
   bool start() {
     if (flying() || session->status().in_air || !session->status().connected) return false;
-    control = std::make_unique<procedure::FlightControl>(setup(rover()), frame, session.get());
+    auto flight = setup(rover());
+    if (other) other(flight);
+    control = std::make_unique<procedure::FlightControl>(std::move(flight), frame, session.get());
     aborted = false;
     control->fix(now, rover(), FixClass::rtk_fixed);
     return control->start(now, "operator");

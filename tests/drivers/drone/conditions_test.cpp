@@ -24,6 +24,26 @@ TEST_P(Conditions, AFlightAfterATakeOverFliesAndLandsAtAnEmptyBattery) {
   EXPECT_TRUE(rig.run_until([&] { return rig.done() && !rig.autopilot.vehicle().armed(); }, 60));
 }
 
+// 100 m up at 1.5 m/s: longer than the step's time. It was told to take off again, refused that, as
+// autopilots do in the air, and hovered there with a flight that had ended.
+TEST_P(Conditions, ATakeOffThatClimbsForLongIsFlownAndNotLeftInTheAir) {
+  AirRig rig(options());
+  rig.other = [](procedure::FlightSetup& s) {
+    s.settings.min_height_m = 100;
+    s.settings.max_height_m = 110;
+    s.limits.bounds.min_height_m = 100;
+    s.limits.bounds.max_height_m = 110;
+    for (auto& w : s.settings.waypoints) w.point_m.z() += 100;
+  };
+  rig.run(7);
+  ASSERT_TRUE(rig.start());
+  ASSERT_TRUE(rig.until_step(Step::go_to_waypoint, 100)) << rig.reason();
+  EXPECT_GT(rig.autopilot.vehicle().position_m().z(), 85);
+  rig.act("land");
+  EXPECT_TRUE(rig.run_until([&] { return rig.done() && !rig.autopilot.vehicle().armed(); }, 200))
+      << rig.reason();
+}
+
 // Its report came when the next flight was there already, and ended that.
 TEST_P(Conditions, WhatBecameOfTheLastTakeOffIsNotTheNextFlights) {
   AirRig rig(options());
