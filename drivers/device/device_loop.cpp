@@ -93,7 +93,6 @@ struct Entry {
   std::string notice;  ///< of this link's driver
   Noise noise{};
   SentIds ids{};
-  BaseWatch base_watch{};
 };
 
 }  // namespace
@@ -150,6 +149,7 @@ class DeviceLoop::Impl final : public PipelineSink, public std::enable_shared_fr
     // First: what its driver still held, such as the epoch of now, comes out while somebody hears it.
     (void)take({EventKind::removed, *slot, link::arrival_now(), {}});
     entries_.erase(*slot);
+    if (based_on_ == id && pipeline_.mission() == MissionId{}) base_watch_ = {};
     listener_.changed(id);
     return boost::outcome_v2::success();
   }
@@ -169,7 +169,7 @@ class DeviceLoop::Impl final : public PipelineSink, public std::enable_shared_fr
   void record_into(const std::optional<MissionId>& mission) {
     const auto text = mission ? to_string(*mission) : std::string();
     (void)take({EventKind::mission, 0, link::arrival_now(), text});
-    for (auto& [slot, entry] : entries_) entry.base_watch.flight(mission.has_value());
+    base_watch_.flight(mission.has_value());
   }
 
   void record_to(record::Recorder* recorder) {
@@ -261,7 +261,9 @@ class DeviceLoop::Impl final : public PipelineSink, public std::enable_shared_fr
     const auto found = entries_.find(slot);
     if (found == entries_.end()) return;
     found->second.told.base = station;
-    found->second.base_watch.note(station);
+    if (!pipeline_.may_correct(slot)) return;
+    based_on_ = found->second.settings.id;
+    base_watch_.note(station);
   }
   void heard(std::uint16_t slot) override {
     const auto found = entries_.find(slot);
@@ -279,6 +281,12 @@ class DeviceLoop::Impl final : public PipelineSink, public std::enable_shared_fr
     const auto found = entries_.find(slot);
     if (found == entries_.end() || found->second.notice == text) return;
     found->second.notice = text;
+    listener_.changed(found->second.settings.id);
+  }
+  void unused(std::uint16_t slot, std::string_view why) override {
+    const auto found = entries_.find(slot);
+    if (found == entries_.end() || found->second.told.unused == why) return;
+    found->second.told.unused = why;
     listener_.changed(found->second.settings.id);
   }
   void answer(std::uint16_t slot, std::uint64_t id, const Result<std::string>& json) override {
@@ -317,9 +325,10 @@ class DeviceLoop::Impl final : public PipelineSink, public std::enable_shared_fr
     out.phase = entry.supervision.phase;
     out.reason = entry.supervision.reason;
     out.too_many_ids = entry.ids.trouble();
-    out.moved_base = entry.base_watch.trouble();
+    if (entry.settings.id == based_on_) out.moved_base = base_watch_.trouble();
     if (out.phase == Phase::talking && out.reason.empty())
-      out.reason = !entry.notice.empty()     ? entry.notice
+      out.reason = !out.unused.empty()       ? out.unused
+                   : !entry.notice.empty()   ? entry.notice
                    : !out.moved_base.empty() ? out.moved_base
                                              : out.too_many_ids;
     const auto at = now();
@@ -561,6 +570,9 @@ class DeviceLoop::Impl final : public PipelineSink, public std::enable_shared_fr
   }
 
   asio::io_context& io_;
+  // Of the flight and not of a device: one that is changed or added meanwhile starts nothing anew.
+  BaseWatch base_watch_{};
+  std::string based_on_;  ///< id of the device whose corrections it watches
   record::Recorder* recorder_;
   DeviceListener& listener_;
   LoopOptions options_;

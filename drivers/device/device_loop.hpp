@@ -31,7 +31,8 @@ struct DeviceState {
   std::string reason;        ///< why it is not talking; while it talks, what is wrong with what it says
   std::string too_many_ids;  ///< what is wrong with the ids it sends, and what to do; empty: nothing
   std::string moved_base;  ///< what became of the base behind its corrections in this flight; empty: nothing
-  std::string conflict;    ///< two devices on one port, or one identity on two devices; empty: none
+  std::string unused;  ///< why what it gives is left out beside another's, and what to do; empty: it is used
+  std::string conflict;  ///< two devices on one port, or one identity on two devices; empty: none
   double in_phase_s{0};
   std::optional<UtcTime> last_seen{};
   Identity identity;

@@ -1,5 +1,7 @@
 #include "drivers/device/pipeline.hpp"
 
+#include <utility>
+
 #include "core/base/text.hpp"
 #include "drivers/device/settings.hpp"
 
@@ -8,6 +10,12 @@ namespace anchord::device {
 namespace {
 
 constexpr std::size_t k_most_word = 200, k_most_reason = 10'000;
+constexpr std::string_view k_other_receiver =
+    "another receiver gives the track: the positions of this one are not stored. Switch off the one whose "
+    "antenna is not on the aircraft";
+constexpr std::string_view k_other_caster =
+    "another source gives the corrections: those of this one are not used. Switch off the one that is not "
+    "wanted";
 
 /// The wire says microseconds, and a row's time is part of its identity: one that is sent again, by a replay
 /// or by another program, must be the row that was stored.
@@ -50,6 +58,10 @@ class Pipeline::Device final : public DriverOutput {
 
   void send(std::string_view bytes) override { owner_.sink_.send(slot_, bytes); }
   void emit(Fix fix) override {
+    const bool rtk = fix.fix >= FixClass::rtk_float;
+    const bool mine = owner_.track_.takes(slot_, rtk, owner_.now_ns_, owner_.records());
+    say_unused(mine ? std::string_view() : k_other_receiver);
+    if (!mine && owner_.records()) return owner_.sink_.dropped(slot_, "other_source", 1);
     fix.mission = owner_.mission_;
     in_microseconds(fix);
     with_one_zero(fix);
@@ -61,7 +73,7 @@ class Pipeline::Device final : public DriverOutput {
     owner_.sink_.range(slot_, range);
   }
   void rover(const RoverStatus& status) override {
-    if (status.position) owner_.rover_ = status;
+    if (status.position && owner_.track_.may_be(slot_)) owner_.rover_ = status;
     owner_.sink_.rover(slot_, status);
   }
   // The door of every driver: whatever a device said, its words go on as UTF-8 and bounded.
@@ -77,11 +89,20 @@ class Pipeline::Device final : public DriverOutput {
     owner_.sink_.dropped(slot_, to_utf8(reason, k_most_word), n);
   }
   void notice(std::string_view text) override { owner_.sink_.notice(slot_, to_utf8(text, k_most_reason)); }
+  void unused(std::string_view why) override {
+    by_driver_ = to_utf8(why, k_most_reason);
+    tell();
+  }
   void answer(std::uint64_t id, Result<std::string> json) override {
     if (!json) json = make_error(json.error().code, to_utf8(json.error().message));
     owner_.sink_.answer(slot_, id, json);
   }
-  void corrections(std::string_view bytes) override { owner_.correct(bytes); }
+  void corrections(std::string_view bytes) override {
+    const bool mine = owner_.corrections_.takes(slot_, true, owner_.now_ns_, owner_.records());
+    say_unused(mine ? std::string_view() : k_other_caster);
+    if (!mine) return owner_.sink_.dropped(slot_, "other_source", 1);
+    owner_.correct(bytes);
+  }
   void hang_up(std::string_view why, std::int64_t wait_ns) override {
     owner_.sink_.hang_up(slot_, to_utf8(why, k_most_reason), wait_ns);
   }
@@ -90,8 +111,15 @@ class Pipeline::Device final : public DriverOutput {
   std::uint16_t slot() const override { return slot_; }
 
  private:
+  void say_unused(std::string_view why) {
+    if (std::exchange(unused_, why) != why) tell();
+  }
+  void tell() { owner_.sink_.unused(slot_, unused_.empty() ? std::string_view(by_driver_) : unused_); }
+
   Pipeline& owner_;
   std::uint16_t slot_;
+  std::string by_driver_;      ///< why a part of what it gives is not used; empty: all is
+  std::string_view unused_{};  ///< the same, beside other devices
   Settings settings_;
   std::string json_;
   std::unique_ptr<Driver> driver_;
@@ -127,6 +155,7 @@ std::optional<std::int64_t> Pipeline::deadline_ns(std::uint16_t slot) const {
 Result<void> Pipeline::take(const record::Event& event) {
   using record::EventKind;
   time_.arrived(event.at);
+  now_ns_ = event.at.steady_ns;
   if (event.kind == EventKind::added) return add(event.slot, event.payload);
   if (event.kind == EventKind::mission) {
     if (event.payload.empty()) {
@@ -135,6 +164,8 @@ Result<void> Pipeline::take(const record::Event& event) {
     }
     BOOST_OUTCOME_TRY(const auto id, parse_uuid(event.payload));
     mission_ = MissionId{id};
+    track_.recording_begins(now_ns_);
+    corrections_.recording_begins(now_ns_);
     return boost::outcome_v2::success();
   }
   const auto found = devices_.find(event.slot);
@@ -167,6 +198,8 @@ Result<void> Pipeline::take(const record::Event& event) {
     case EventKind::removed:
       device.close(event.at);
       time_.receiver_gone(event.slot);
+      track_.gone(event.slot);
+      corrections_.gone(event.slot);
       devices_.erase(found);
       break;
     case EventKind::added:

@@ -10,6 +10,7 @@
 #include "core/base/ids.hpp"
 #include "core/base/result.hpp"
 #include "drivers/port/driver.hpp"
+#include "drivers/port/one_source.hpp"
 #include "drivers/record/event.hpp"
 #include "drivers/time/time_base.hpp"
 
@@ -30,6 +31,7 @@ class PipelineSink {
   virtual void heard(std::uint16_t slot) = 0;
   virtual void dropped(std::uint16_t slot, std::string_view reason, std::uint64_t n) = 0;
   virtual void notice(std::uint16_t slot, std::string_view text) { (void)slot, (void)text; }
+  virtual void unused(std::uint16_t slot, std::string_view why) { (void)slot, (void)why; }
   virtual void answer(std::uint16_t slot, std::uint64_t command_id, const Result<std::string>& json) = 0;
   virtual void hang_up(std::uint16_t slot, std::string_view why, std::int64_t wait_ns) = 0;
 };
@@ -51,17 +53,22 @@ class Pipeline {
   std::optional<std::int64_t> deadline_ns(std::uint16_t slot) const;
   timing::TimeBase& time() { return time_; }
   const MissionId& mission() const { return mission_; }
+  /// Its corrections are those that go to the rovers, or nobody's do yet.
+  bool may_correct(std::uint16_t slot) const { return corrections_.may_be(slot); }
 
  private:
   class Device;
   Result<void> add(std::uint16_t slot, std::string_view json);
   void correct(std::string_view bytes);
+  bool records() const { return mission_ != MissionId{}; }
 
   PipelineSink& sink_;
   timing::TimeBase time_;
   MissionId mission_{};
   std::map<std::uint16_t, std::unique_ptr<Device>> devices_;
-  std::optional<RoverStatus> rover_{};
+  std::optional<RoverStatus> rover_{};  ///< of the receiver that gives the track
+  OneSource<std::uint16_t> track_{}, corrections_{};
+  std::int64_t now_ns_{0};  ///< steady, of the event that is taken
 };
 
 }  // namespace anchord::device

@@ -26,6 +26,7 @@ constexpr std::string_view to_string(Protocol protocol) { return k_protocol_word
 /// One position epoch of a receiver, whatever it speaks. Absent means unknown: no zeros, no NaN.
 /// With fix none there is no position, even where the receiver still prints an old one.
 struct Epoch {
+  std::string receiver{};  ///< where one wire brings several (gpsd): its name there
   Protocol protocol{Protocol::nmea};
   std::optional<UtcTime> time{};                 ///< of measurement, leap seconds taken out
   std::optional<std::int64_t> time_of_day_ns{};  ///< UTC; for NMEA streams that never say the date

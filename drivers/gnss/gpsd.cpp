@@ -171,6 +171,7 @@ Result<void> Assembler::take(const Report& report, Epochs& out) {
   if (report.kind == "TPV") {
     BOOST_OUTCOME_TRY(auto epoch, epoch_of(json));
     epoch.time = time;
+    epoch.receiver = last_;
     if (!time && epoch.fix == FixClass::none) return boost::outcome_v2::success();  // nothing yet
     if (!time) return make_error(Errc::unsupported, "time absent or not readable");
     device.merge(epoch, out);

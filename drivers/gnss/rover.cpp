@@ -90,6 +90,8 @@ void Rover::opened(const Arrival& now) {
   step_ns_.reset();
   burst_ = given_ = now;
   last_ = {};
+  receiver_.recording_begins(now.steady_ns);
+  out_.unused("");
   if (options_.format == Protocol::gpsd) watch();
 }
 
@@ -220,6 +222,13 @@ void Rover::give_one(const Epoch& epoch, const Arrival& at) {
     return out_.dropped("no_fix");
   }
   if (!epoch.time) return out_.dropped("no_time");
+  if (!receiver_.takes(epoch.receiver, epoch.fix >= FixClass::rtk_float, at.steady_ns, true)) {
+    const std::string why = "this gpsd has several receivers: the positions of " + *receiver_.used() +
+                            " are the track, those of " + epoch.receiver +
+                            " are not stored. Name the one on the aircraft in the setting gpsd_device";
+    out_.unused(why);
+    return out_.dropped("other_source");
+  }
   if (newest_ && epoch.time->ns <= newest_->ns && newest_->ns - epoch.time->ns < k_jump_ns) {
     return out_.dropped(epoch.time == newest_ ? "repeated_epoch" : "out_of_order");
   }

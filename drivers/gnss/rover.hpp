@@ -7,6 +7,7 @@
 
 #include "drivers/gnss/decoder.hpp"
 #include "drivers/port/driver.hpp"
+#include "drivers/port/one_source.hpp"
 
 namespace anchord::gnss {
 
@@ -16,7 +17,7 @@ struct RoverOptions {
   /// Between the instant of measurement and the first byte of it, at least: computing and link. Of the clock
   /// model; makers state 20 to 100 ms.
   double latency_s{0.05};
-  std::string gpsd_device;       ///< which of a gpsd's receivers; empty: all it has
+  std::string gpsd_device;       ///< which of a gpsd's receivers; empty: the first one, or the first with RTK
   bool takes_corrections{true};  ///< of an NTRIP client here; false: it has its own way to a base
 };
 
@@ -65,6 +66,7 @@ class Rover final : public device::Driver {
   std::optional<std::int64_t> undated_since_ns_{};
   std::uint64_t seq_{0};
   std::optional<device::Identity> identity_{};
+  device::OneSource<std::string> receiver_{};  ///< of a gpsd's
 };
 
 }  // namespace anchord::gnss

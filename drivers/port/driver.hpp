@@ -73,6 +73,9 @@ class DriverOutput {
   /// One line about what this connection sends that a person should act on, though it talks; empty: nothing
   /// any more. Without running numbers.
   virtual void notice(std::string_view text) { (void)text; }
+  /// Why some of what it gives is left out beside better of the same kind, and what to do: an alarm. Empty:
+  /// no longer.
+  virtual void unused(std::string_view why) { (void)why; }
   /// Outcome of a command: a JSON value, or why not. Exactly once a command.
   virtual void answer(std::uint64_t command_id, Result<std::string> json) = 0;
   /// Corrections for rovers (RTCM), from an NTRIP client.

@@ -327,6 +327,9 @@ std::vector<api::AlarmCondition> App::State::alarms() const {
                    std::nullopt});
   if (auto ids = devices->too_many_ids(); !ids.empty())
     out.push_back({"devices.ids", api::AlarmPriority::warning, std::move(ids), std::nullopt});
+  if (auto unused = devices->unused_sources(); !unused.empty())
+    out.push_back(
+        {"devices.unused", api::AlarmPriority::warning, std::move(unused), devices->recording_into()});
   if (auto moved = devices->moved_bases(); !moved.empty())
     out.push_back({"rtk.base", api::AlarmPriority::warning, std::move(moved), devices->recording_into()});
   std::error_code unknown;

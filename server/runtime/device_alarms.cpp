@@ -29,6 +29,10 @@ std::string moved_bases(const std::vector<device::DeviceState>& devices) {
   return by_device(devices, &device::DeviceState::moved_base);
 }
 
+std::string unused_sources(const std::vector<device::DeviceState>& devices) {
+  return by_device(devices, &device::DeviceState::unused);
+}
+
 std::string recordings_on_disk(const std::filesystem::path& folder,
                                const std::vector<device::DeviceState>& devices) {
   std::error_code error;

@@ -10,6 +10,7 @@ namespace anchord::server {
 
 /// Devices that send more ids than a flight follows, one line; empty: none.
 std::string too_many_ids(const std::vector<device::DeviceState>& devices);
+std::string unused_sources(const std::vector<device::DeviceState>& devices);
 
 /// Devices whose base of corrections moved or changed in this flight, one line; empty: none.
 std::string moved_bases(const std::vector<device::DeviceState>& devices);

@@ -582,6 +582,7 @@ std::string DeviceManager::not_started() { return impl_->not_started(); }
 
 std::uint64_t DeviceManager::rows_lost() { return impl_->unstored_.dropped(); }
 
+std::string DeviceManager::unused_sources() { return server::unused_sources(impl_->states()); }
 std::string DeviceManager::too_many_ids() { return server::too_many_ids(impl_->states()); }
 std::string DeviceManager::moved_bases() { return server::moved_bases(impl_->states()); }
 std::string DeviceManager::recordings_on_disk() {

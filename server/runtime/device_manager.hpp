@@ -55,6 +55,7 @@ class DeviceManager final : public DeviceControl {
   std::uint64_t rows_lost();
   /// Devices that send more ids than a flight follows, one line; empty: none.
   std::string too_many_ids();
+  std::string unused_sources();
   /// Devices whose base of corrections moved or changed in this flight, one line; empty: none.
   std::string moved_bases();
   /// What the raw recordings take of the disk, where they are and which device writes most of them, one line;

@@ -38,6 +38,7 @@ struct Collect final : PipelineSink {
     drops[std::string(reason)] += n;
   }
   void notice(std::uint16_t slot, std::string_view text) override { notices[slot] = std::string(text); }
+  void unused(std::uint16_t slot, std::string_view why) override { unused_why[slot] = std::string(why); }
   void answer(std::uint16_t, std::uint64_t id, const Result<std::string>& json) override {
     answers[id] = json ? json.value() : "error: " + json.error().message;
   }
@@ -56,6 +57,7 @@ struct Collect final : PipelineSink {
   std::map<std::uint16_t, ClockReading> clocks;
   std::map<std::string, std::uint64_t> drops;
   std::map<std::uint16_t, std::string> notices;
+  std::map<std::uint16_t, std::string> unused_why;
   std::map<std::uint64_t, std::string> answers;
   std::string rows;
   int heard_count{0};

@@ -223,6 +223,76 @@ TEST(Rover, EpochsThatWaitedOnTheWayAreAllTaken) {
   EXPECT_EQ(rover.sink.drops["time_step"], 0U);
 }
 
+/// Two receivers of one server, 1.5 m apart, that measure at the same moments.
+struct TwoRovers {
+  TwoRovers() : pipeline(sink) {
+    for (const std::uint16_t slot : {std::uint16_t{1}, std::uint16_t{2}}) {
+      take(EventKind::added, slot, 0,
+           device::to_json({"r" + std::to_string(slot), "gnss", "", "tcp://127.0.0.1:1", "{}"}));
+      take(EventKind::opened, slot, 0);
+    }
+  }
+  void take(EventKind kind, std::uint16_t slot, std::int64_t steady, std::string_view payload = {}) {
+    const auto done = pipeline.take({kind, slot, {UtcTime{k_epoch + steady}, steady}, payload});
+    EXPECT_TRUE(done) << done.error().message;
+  }
+  /// Both in the second; the fixes that come of it.
+  std::vector<FixClass> second(int s, std::optional<int> first, std::optional<int> other) {
+    sink.fixes.clear();
+    for (const auto& [slot, quality] : {std::pair<std::uint16_t, std::optional<int>>{1, first}, {2, other}}) {
+      if (!quality) continue;
+      take(EventKind::bytes, slot, s * k_s + 80 * k_ms, rmc(s) + gga(s, *quality));
+      if (const auto due = pipeline.deadline_ns(slot)) take(EventKind::tick, slot, *due);
+    }
+    std::vector<FixClass> out;
+    for (const auto& fix : sink.fixes) out.push_back(fix.fix);
+    return out;
+  }
+  Collect sink;
+  device::Pipeline pipeline;
+};
+constexpr int k_fixed = 4, k_float = 5, k_single = 1;
+const char* const k_some_mission = "01a2296a-da79-7389-9034-b3afdf9ede3d";
+
+TEST(TwoReceivers, OneGivesTheTrackAndTheOtherIsNamed) {
+  using C = FixClass;
+  TwoRovers two;
+  EXPECT_EQ(two.second(0, k_float, k_fixed).size(), 2U) << "nothing is stored: both are seen";
+  EXPECT_NE(two.sink.unused_why[2].find("another receiver gives the track"), std::string::npos)
+      << "before the flight";
+  two.take(EventKind::mission, 0, k_s, k_some_mission);
+  EXPECT_EQ(two.second(1, k_float, k_fixed), std::vector{C::rtk_float});
+  EXPECT_NE(two.sink.unused_why[2].find("another receiver gives the track"), std::string::npos);
+  EXPECT_EQ(two.sink.drops["other_source"], 1U);
+  EXPECT_EQ(two.sink.unused_why[1], "");
+  EXPECT_EQ(two.second(2, k_float, k_fixed), std::vector{C::rtk_float});
+  for (int s = 3; s < 12; ++s)
+    EXPECT_TRUE(two.second(s, std::nullopt, k_fixed).empty()) << "a place 1.5 m away, " << s;
+  EXPECT_EQ(two.second(12, k_fixed, k_fixed), std::vector{C::rtk_fixed});
+  two.take(EventKind::removed, 1, 13 * k_s);
+  EXPECT_EQ(two.second(14, std::nullopt, k_fixed), std::vector{C::rtk_fixed});
+  EXPECT_EQ(two.sink.unused_why[2], "");
+}
+
+TEST(TwoReceivers, OneWithoutRtkGivesWayToOneThatHasIt) {
+  using C = FixClass;
+  TwoRovers two;
+  two.take(EventKind::mission, 0, 0, k_some_mission);
+  EXPECT_EQ(two.second(0, k_single, k_single), std::vector{C::single});
+  EXPECT_EQ(two.second(1, k_single, k_fixed), (std::vector{C::single, C::rtk_fixed}));
+  EXPECT_EQ(two.second(2, k_single, k_float), std::vector{C::rtk_float});
+  EXPECT_EQ(two.sink.unused_why[2], "");
+  EXPECT_NE(two.sink.unused_why[1], "");
+}
+
+TEST(TwoReceivers, OneThatWasSilentBeforeTheFlightIsNotWaitedFor) {
+  TwoRovers two;
+  EXPECT_EQ(two.second(0, k_fixed, std::nullopt).size(), 1U);
+  two.take(EventKind::mission, 0, 20 * k_s, k_some_mission);
+  EXPECT_EQ(two.second(21, std::nullopt, k_fixed).size(), 1U);
+  EXPECT_TRUE(two.second(22, k_fixed, std::nullopt).empty());
+}
+
 TEST(Rover, RefusesOptionsItDoesNotKnow) {
   Collect sink;
   device::Pipeline pipeline(sink);

@@ -96,7 +96,7 @@ TEST(Replay, RebuildsTheSameRowsByteForByteThroughCutsNoiseTicksAndUnplugging) {
       fixes = live.sink.fixes.size();
     }
     EXPECT_GT(parts_of(first).value().size(), 2U);
-    EXPECT_GT(fixes, 60U);
+    EXPECT_GT(fixes, 30U) << "of 40: one of the two gives the track";
     EXPECT_EQ(replayed(first), rows) << "seed " << seed;
     fs::remove_all(folder);
   }

@@ -90,7 +90,9 @@ class Str2str : public testing::Test {
 TEST_F(Str2str, RelaysARoverOverTcpAndIntoAFileWithoutMovingIt) {
   serve(RoverFormat::ubx, RoverPort::tcp);
   const std::string log = folder_ / "rover.ubx";
-  ASSERT_TRUE(loop_.add({"direct", "gnss", "direct", rover().address, "{}"}));
+  device::DeviceLoop beside{io_, nullptr, rows_, {}};  // one loop has one track
+  beside.record_into(MissionId{Uuid{{1}}});
+  ASSERT_TRUE(beside.add({"direct", "gnss", "direct", rover().address, "{}"}));
   test::Program relay({k_str2str, "-in", "tcpcli://127.0.0.1:" + std::to_string(rover().tcp_port), "-out",
                        listen(), "-out", "file://" + log, "-r", "200"});
   ASSERT_TRUE(until([&] { return rows_.fixes["relayed"].size() >= 20; })) << loop_.device("relayed")->reason;

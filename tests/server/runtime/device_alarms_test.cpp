@@ -39,6 +39,9 @@ TEST(DeviceAlarms, EachDeviceThatSendsTooManyIdsOrWhoseBaseMovedIsNamed) {
   EXPECT_EQ(moved_bases(devices), "");
   devices[0].moved_base = "its base moved";
   EXPECT_EQ(moved_bases(devices), "device \"a\": its base moved");
+  EXPECT_EQ(unused_sources(devices), "");
+  devices[2].unused = "another one is used";
+  EXPECT_EQ(unused_sources(devices), "device \"c\": another one is used");
 }
 
 TEST(DeviceNews, OfADeviceThatIsNotThereAreALineOfEachKindAndThenOneInTenMinutesWithTheirNumber) {
