@@ -248,9 +248,10 @@ Result<PlanCheck> check_plan(const Plan& plan) {
            with_numbers("the flight is expected to take %.0f s; at the limit of %.0f s it returns unfinished",
                         check.time.expected_s, *limit));
   }
-  if (check.n_measure > 0 && check.n_measure < 4) {
+  if (!plan.waypoints.empty() && check.n_measure < 4) {
     report(Severity::warning, "few_points", "/waypoints",
-           with_numbers("%.0f measuring points: a position needs at least four that are not in one plane",
+           with_numbers("%.0f measuring points (measure; of an imported plan those with a hold time): a "
+                        "position needs at least four that are not in one plane",
                         static_cast<double>(check.n_measure)));
   }
   predict(plan, local, check);
