@@ -62,6 +62,15 @@ void ranges(const FlightPulse& f, std::vector<AlarmCondition>& out) {
   out.push_back({"uwb.none", AlarmPriority::warning, f.name + ": no ranges for more than 5 s", f.mission});
 }
 
+void tags(const FlightPulse& f, std::vector<AlarmCondition>& out) {
+  if (f.unknown_tags.empty()) return;
+  out.push_back({"uwb.tag", AlarmPriority::warning,
+                 f.name + ": ranges of tag " + f.unknown_tags + " are stored and not used, the mission has " +
+                     (f.known_tags.empty() ? "none" : f.known_tags) +
+                     ": correct the tags of the mission, or put its tag on the aircraft",
+                 f.mission});
+}
+
 void clock(const FlightPulse& f, std::vector<AlarmCondition>& out) {
   if (!f.lag_s || std::abs(*f.lag_s) - 2 * f.lag_sigma_s.value_or(0) <= k_skew_s) return;
   char text[96];
@@ -139,6 +148,7 @@ std::vector<AlarmCondition> alarm_conditions(const std::vector<FlightPulse>& fli
     if (!f.as_it_happens) continue;
     rtk(f, out);
     ranges(f, out);
+    tags(f, out);
     clock(f, out);
     models(f, out);
   }

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdio>
 
+#include "core/flight/known_tags.hpp"
 #include "core/flight/parameters.hpp"
 
 namespace anchord::flight {
@@ -108,7 +109,12 @@ std::vector<ChecklistItem> make_checklist(const ChecklistFacts& f) {
   out.push_back(item("corrections", "Corrections are younger than 2 s",
                      f.correction_age_s && *f.correction_age_s < 2, true, age(f.correction_age_s)));
   out.push_back(item("tag", "The tag has measured a range in the last 10 s",
-                     f.range_age_s && *f.range_age_s < 10, true, "newest range: " + age(f.range_age_s)));
+                     f.range_age_s && *f.range_age_s < 10 && !f.unknown_tag, true,
+                     f.unknown_tag
+                         ? "ranges come from tag " + to_string(*f.unknown_tag) +
+                               ", which the mission does not have (" +
+                               (f.mission != nullptr ? tags_text(*f.mission) : "") + "): they are not used"
+                         : "newest range: " + age(f.range_age_s)));
   std::string why = "no plan is chosen";
   if (f.plan != nullptr) {
     why = f.plan->flyable() ? "no error found" : "";

@@ -29,7 +29,8 @@ struct ChecklistFacts {
   std::optional<FixClass> fix{};        ///< of it
   std::optional<double> fixed_for_s{};  ///< RTK fixed without a break
   std::optional<double> correction_age_s{};
-  std::optional<double> range_age_s{};  ///< newest range
+  std::optional<double> range_age_s{};     ///< newest range
+  std::optional<NetworkId> unknown_tag{};  ///< whose ranges come, and that the mission does not have
   double disk_free_bytes{};
   bool writable{true};
   double min_battery{0.3};

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "core/flight/known_tags.hpp"
 #include "core/geo/enu.hpp"
 #include "core/localize/flight_solver.hpp"
 #include "core/types/live_limits.hpp"
@@ -44,6 +45,8 @@ void LiveMission::add(const PredictedRange& judged) {
   state_.range_rate_hz = span_s > 0 ? static_cast<double>(range_times_us_.size() - 1) / span_s : 0;
   if (!follows(range)) return;
   watch_.note_range(range.time);
+  if (const auto& mission = setup_.mission; range.kind == RangeKind::tag_anchor && !has_tag(mission, range))
+    watch_.note_unknown_tag(range.tag, range.time, tags_text(mission));
   if (excluded(setup_.exclusions, range)) return live_.leave_out(range);
   if (judged.model) watch_.note_model(judged.model->withheld);
   history_.add(corrected(judged), error_model_of(judged));

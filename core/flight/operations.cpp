@@ -108,6 +108,7 @@ void Operations::range(const Now& now, const MissionId& mission, const RangeResu
   auto& r = received_[mission];
   const double measured_s = r.ranges.at(result.range.time, now.s);
   r.range_s = measured_s;
+  r.unknown_tag = result.refused == "unknown_tag" ? std::optional(result.range.tag) : std::nullopt;
   if (!flight_ || flight_->mission != mission) return;
   // No estimate yet is no reason: what counts is that the exchange worked.
   flight_->control.engine().range(measured_s, result.range.anchor, result.used(), result.range.rss_dbm,

@@ -226,6 +226,7 @@ class Operations {
     MeasuredTime fixes, ranges;
     std::optional<double> fix_s{}, fixed_since_s{}, range_s{}, correction_age_s{};
     std::optional<Fix> fix{};
+    std::optional<NetworkId> unknown_tag{};  ///< of the newest range, where the mission does not have it
   };
   struct Override {
     std::string who, reason;

@@ -91,6 +91,7 @@ std::vector<ChecklistItem> Operations::checklist(const Now& now, const Mission* 
     if (r.fix) facts.fix = r.fix->fix;
     if (r.fixed_since_s) facts.fixed_for_s = now.s - *r.fixed_since_s;
     if (r.range_s) facts.range_age_s = now.s - *r.range_s;
+    facts.unknown_tag = r.unknown_tag;
     if (facts.fix_age_s && r.correction_age_s)
       facts.correction_age_s = *facts.fix_age_s + *r.correction_age_s;
   }

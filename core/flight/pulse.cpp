@@ -6,6 +6,7 @@ namespace {
 constexpr std::size_t k_looks = 10;
 // One range in five of the newest fifty: single odd ones are what withholding is for.
 constexpr std::size_t k_judged = 50, k_many_withheld = 10;
+constexpr double k_unknown_tag_s = 10;
 // A wall moves no anchor by more, and no anchor so far that its own uncertainty could.
 constexpr double k_moved_m = 3, k_moved_regions = 3;
 
@@ -29,6 +30,11 @@ void FlightWatch::note(const Fix& fix) {
 void FlightWatch::note_range(UtcTime measured) {
   if (!pulse_.first_range) pulse_.first_range = measured;
   if (!pulse_.newest_range || *pulse_.newest_range < measured) pulse_.newest_range = measured;
+}
+
+void FlightWatch::note_unknown_tag(NetworkId tag, UtcTime measured, const std::string& known_tags) {
+  unknown_tags_[tag] = measured;
+  pulse_.known_tags = known_tags;
 }
 
 void FlightWatch::note_lag(double lag_s, double sigma_s) {
@@ -62,6 +68,10 @@ void FlightWatch::note_moved(NetworkId anchor, std::optional<double> moved_m, do
 }
 
 FlightPulse FlightWatch::look(UtcTime newest_measured, Steady now) {
+  pulse_.unknown_tags.clear();
+  for (const auto& [tag, measured] : unknown_tags_)
+    if (seconds_between(measured, newest_measured) < k_unknown_tag_s)
+      pulse_.unknown_tags += (pulse_.unknown_tags.empty() ? "" : ", ") + to_string(tag);
   looks_.emplace_back(newest_measured, now);
   if (looks_.size() > k_looks) looks_.pop_front();
   if (looks_.size() == k_looks) {

@@ -2,6 +2,7 @@
 
 #include <chrono>
 #include <deque>
+#include <map>
 #include <optional>
 #include <set>
 #include <string>
@@ -29,8 +30,10 @@ struct FlightPulse {
   std::optional<double> correction_age_s{};                   ///< of the newest fix, where it says
   std::optional<double> lag_s{}, lag_sigma_s{};               ///< of the joint solution
   std::string_view models_withheld{};  ///< why the models' corrections are not applied, while many are not
-  std::string models_moved{};          ///< anchors that the models move by metres
-  bool as_it_happens{false};  ///< rows come about as fast as they were measured: no upload, no fast replay
+  std::string unknown_tags{};  ///< tags that range and that the mission does not have; empty: none lately
+  std::string known_tags{};    ///< those it has
+  std::string models_moved{};  ///< anchors that the models move by metres
+  bool as_it_happens{false};   ///< rows come about as fast as they were measured: no upload, no fast replay
 };
 
 /// Keeps what the alarms of one flight ask about. Not thread-safe.
@@ -39,6 +42,8 @@ class FlightWatch {
   using Steady = std::chrono::steady_clock::time_point;
   void note(const Fix& fix);
   void note_range(UtcTime measured);
+  /// Of a range whose tag the mission does not have: it is stored, and nothing is solved with it.
+  void note_unknown_tag(NetworkId tag, UtcTime measured, const std::string& known_tags);
   void note_lag(double lag_s, double sigma_s);
   /// A range that models judged; `withheld`: why their correction was not applied, empty where it was.
   void note_model(std::string_view withheld);
@@ -55,6 +60,7 @@ class FlightWatch {
   std::deque<std::pair<UtcTime, Steady>> looks_;
   std::deque<std::string_view> withheld_;  ///< of the newest ranges that models judged
   std::set<NetworkId> moved_;
+  std::map<NetworkId, UtcTime> unknown_tags_;  ///< newest range of each
 };
 
 }  // namespace anchord::flight

@@ -104,6 +104,26 @@ TEST(AlarmRules, CallClocksThatDifferBeyondDoubt) {
   EXPECT_EQ(raised(f), "") << "within what the flight can tell";
 }
 
+TEST(AlarmRules, CallATagThatTheMissionDoesNotHaveUntilItHasBeenSilentForTenSeconds) {
+  auto f = well();
+  flight::FlightWatch watch;
+  const auto take = [&](double newest_s) {
+    f.unknown_tags = watch.look(at(newest_s), flight::FlightWatch::Steady{}).unknown_tags;
+  };
+  take(100);
+  EXPECT_EQ(raised(f), "");
+  watch.note_unknown_tag(NetworkId{0x6e02}, at(101), "0x6e01");
+  f.known_tags = watch.look(at(102), flight::FlightWatch::Steady{}).known_tags;
+  take(102);
+  EXPECT_EQ(raised(f), "uwb.tag");
+  EXPECT_EQ(api::alarm_conditions({f}, {})[0].text,
+            "flight: ranges of tag 0x6e02 are stored and not used, the mission has 0x6e01: correct the tags "
+            "of the mission, or put its tag on the "
+            "aircraft");
+  take(111.5);
+  EXPECT_EQ(raised(f), "");
+}
+
 TEST(AlarmRules, CallCorrectionsThatAreNotAppliedAndAnchorsThatModelsMove) {
   auto f = well();
   flight::FlightWatch watch;

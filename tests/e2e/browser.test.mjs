@@ -37,6 +37,12 @@ function replay(server, speed) {
   const ended = new Promise((done) => child.once('exit', (code) => done({ code, stderr })));
   return { ended, stop: () => child.kill('SIGTERM') };
 }
+/** What the first page gives to copy. */
+const commands = (id) =>
+  id('first-run')
+    .locator('input')
+    .evaluateAll((all) => all.map((e) => e.value));
+
 test('a cold start offline shows what to do first, asks no other host and logs no error', async () => {
   const server = await startServer({ auth: 'off' });
   try {
@@ -45,8 +51,7 @@ test('a cold start offline shows what to do first, asks no other host and logs n
     await eventually('the link is live', async () => (await text(id('status-link'))).includes('LIVE'));
     assert.deepEqual([...seen.hosts], [new URL(server.url).host]);
     assert.deepEqual(seen.errors, []);
-    const first = await id('first-run').textContent();
-    assert.ok(first.includes(`flight DIR --url ${server.url}`) && !first.includes('--token-file'), 'nobody signs in here');
+    assert.ok((await commands(id)).includes(`anchord import flight DIR --url ${server.url}`), 'nobody signs in here');
     await picture(page, 'first-run-light');
     await page.close();
   } finally {
@@ -94,7 +99,7 @@ test('signed out: the sheet asks for a token, refuses a wrong one, and the right
     await id('sign-in-submit').click();
     await id('sign-in').waitFor({ state: 'detached' });
     await eventually('the link is live', async () => (await text(id('status-link'))).includes('LIVE'));
-    assert.ok((await id('first-run').textContent()).includes(`flight DIR --url ${server.url} --token-file TOKEN_FILE`));
+    assert.ok((await commands(id)).includes(`anchord import flight DIR --url ${server.url} --token-file TOKEN_FILE`));
     await page.close();
     await browser.context.clearCookies();
   } finally {

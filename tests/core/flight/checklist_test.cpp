@@ -39,6 +39,23 @@ TEST(Checklist, TwoThatAnswerAsOneAreNotGreenAndNobodyOverridesThat) {
   EXPECT_EQ(item.detail, "two autopilots answer as system 1");
 }
 
+TEST(Checklist, RangesOfATagThatTheMissionDoesNotHaveAreNotGreenAndNameBoth) {
+  Mission mission;
+  mission.tags = {{NetworkId{0x6e01}, 0, {}}};
+  ChecklistFacts facts;
+  facts.mission = &mission;
+  facts.range_age_s = 0.1;
+  const auto tag = [&] {
+    const auto list = make_checklist(facts);
+    return *std::find_if(list.begin(), list.end(), [](const auto& i) { return i.id == "tag"; });
+  };
+  EXPECT_TRUE(tag().green());
+  facts.unknown_tag = NetworkId{0x6e02};
+  EXPECT_FALSE(tag().green());
+  EXPECT_EQ(tag().detail,
+            "ranges come from tag 0x6e02, which the mission does not have (0x6e01): they are not used");
+}
+
 TEST(Checklist, NamesAGroundStationThatSendsAsThisOneDoes) {
   const auto stations = [](const DroneStatus& d) {
     ChecklistFacts facts;
