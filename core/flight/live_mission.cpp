@@ -45,8 +45,6 @@ void LiveMission::add(const PredictedRange& judged) {
   state_.range_rate_hz = span_s > 0 ? static_cast<double>(range_times_us_.size() - 1) / span_s : 0;
   if (!follows(range)) return;
   watch_.note_range(range.time);
-  if (const auto& mission = setup_.mission; range.kind == RangeKind::tag_anchor && !has_tag(mission, range))
-    watch_.note_unknown_tag(range.tag, range.time, tags_text(mission));
   if (excluded(setup_.exclusions, range)) return live_.leave_out(range);
   if (judged.model) watch_.note_model(judged.model->withheld);
   history_.add(corrected(judged), error_model_of(judged));
@@ -103,6 +101,8 @@ void LiveMission::update_live_priors() {
 void LiveMission::settle() {
   update_live_priors();
   for (auto& result : live_.take_ranges()) {
+    if (result.refused == "unknown_tag")
+      watch_.note_unknown_tag(result.range.tag, result.range.time, tags_text(setup_.mission));
     if (!reading_) events_.emplace_back(RangeDecided{std::move(result)});
   }
   for (auto& estimate : live_.take_estimates()) announce_estimate(std::move(estimate));
