@@ -8,6 +8,9 @@
 namespace anchord::procedure {
 namespace {
 
+constexpr double k_other_ground_m =
+    10;  ///< a slope, or a roof, between the plan's ground and the place of take-off
+
 /// The rule that a point breaks, in the operator's words and with the numbers.
 std::string explain(const planning::Bounds& bounds, planning::Refusal refusal, const Eigen::Vector3d& at_m) {
   using planning::Refusal;
@@ -90,10 +93,10 @@ std::optional<Refused> refuse_take_off(const planning::Bounds& bounds, const Eig
   // Straight up from where it stands, which must be inside the fence and outside every no-fly area.
   Eigen::Vector3d above = stands_m;
   above.z() = std::max(height_m, bounds.min_height_m.value_or(height_m));
-  // The plan's heights are above its ground: who has to climb further than they go stands on another ground,
-  // or its height is wrong.
+  // The plan's heights are above its ground: who has to climb much further than they go stands on another
+  // ground, or its height is wrong.
   const double climb_m = above.z() - stands_m.z();
-  if (bounds.max_height_m && climb_m > *bounds.max_height_m)
+  if (bounds.max_height_m && climb_m > *bounds.max_height_m + k_other_ground_m)
     return Refused{"too_high",
                    sentence("no take-off from here: %.0f m up to the plan's height band, which ends at %.0f "
                             "m above its ground:",

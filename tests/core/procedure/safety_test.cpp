@@ -73,6 +73,9 @@ TEST(SafetyGuard, RefusesToClimbFurtherThanThePlanGoesAboveItsGround) {
   bounds.min_height_m = 4;
   bounds.max_height_m = 30;
   EXPECT_FALSE(refuse_take_off(bounds, Vector3d(-10, -10, -20), 4)) << "a slope";
+  auto low = bounds;
+  low.max_height_m = 6;
+  EXPECT_FALSE(refuse_take_off(low, Vector3d(-10, -10, -3), 4)) << "7 m up to a band that ends at 6 m";
   const auto refused = refuse_take_off(bounds, Vector3d(-10, -10, -100), 4);
   ASSERT_TRUE(refused);
   EXPECT_EQ(refused->text,
