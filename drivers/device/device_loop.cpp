@@ -1,7 +1,6 @@
 #include "drivers/device/device_loop.hpp"
 
 #include <algorithm>
-#include <array>
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <chrono>
@@ -10,6 +9,7 @@
 
 #include "core/base/guard.hpp"
 #include "drivers/device/pipeline.hpp"
+#include "drivers/device/rate.hpp"
 #include "drivers/device/settings.hpp"
 #include "drivers/link/serial_port.hpp"
 #include "drivers/record/recorder.hpp"
@@ -23,33 +23,6 @@ using record::EventKind;
 asio::steady_timer::time_point time_point(std::int64_t steady_ns) {
   return asio::steady_timer::time_point(std::chrono::nanoseconds(steady_ns));
 }
-
-/// Rows per second over five whole seconds.
-class Rate {
- public:
-  void count(std::int64_t now_ns) {
-    turn(now_ns);
-    ++slots_[0];
-  }
-  double value(std::int64_t now_ns) const {
-    Rate copy = *this;
-    copy.turn(now_ns);
-    std::uint64_t sum = 0;
-    for (std::size_t i = 1; i < slots_.size(); ++i) sum += copy.slots_[i];
-    return static_cast<double>(sum) / static_cast<double>(slots_.size() - 1);
-  }
-
- private:
-  void turn(std::int64_t now_ns) {
-    for (const auto second = now_ns / 1'000'000'000; second_ < second; ++second_) {
-      if (second - second_ > 10) second_ = second - 10;
-      std::rotate(slots_.rbegin(), slots_.rbegin() + 1, slots_.rend());
-      slots_[0] = 0;
-    }
-  }
-  std::array<std::uint64_t, 6> slots_{};
-  std::int64_t second_{0};
-};
 
 /// For a device whose bytes make no frame, or whose messages give no row.
 std::string unreadable(const Settings& settings, const link::Address& address,

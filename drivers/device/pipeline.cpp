@@ -52,7 +52,9 @@ class Pipeline::Device final : public DriverOutput {
     driver_->opened(at);
   }
   void close(const Arrival& at) {
-    if (std::exchange(open_, false)) driver_->closed(at);
+    if (!std::exchange(open_, false)) return;
+    driver_->closed(at);
+    say_unused({});  // what gives nothing is not left out
   }
   bool is_open() const { return open_; }
 

@@ -214,6 +214,7 @@ bool Rover::is_lone_step(UtcTime measured, const Arrival& at) {
 
 void Rover::give_one(const Epoch& epoch, const Arrival& at) {
   if (epoch.fix == FixClass::none) {
+    if (!receiver_.may_be(epoch.receiver)) return out_.dropped("other_source");
     // Its clock runs on a battery, or from the first second of 1980: no time of it counts, only that it is
     // there.
     auto status = status_of(epoch);

@@ -269,6 +269,8 @@ TEST(TwoReceivers, OneGivesTheTrackAndTheOtherIsNamed) {
   for (int s = 3; s < 12; ++s)
     EXPECT_TRUE(two.second(s, std::nullopt, k_fixed).empty()) << "a place 1.5 m away, " << s;
   EXPECT_EQ(two.second(12, k_fixed, k_fixed), std::vector{C::rtk_fixed});
+  two.take(EventKind::closed, 2, 12 * k_s + 500 * k_ms);
+  EXPECT_EQ(two.sink.unused_why[2], "") << "it gives nothing";
   two.take(EventKind::removed, 1, 13 * k_s);
   EXPECT_EQ(two.second(14, std::nullopt, k_fixed), std::vector{C::rtk_fixed});
   EXPECT_EQ(two.sink.unused_why[2], "");
