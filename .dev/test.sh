@@ -36,7 +36,7 @@ run_tests() {
   local folder=$1 ; shift
   local log=$folder/test.log junit=$folder/junit.xml second=$folder/junit-alone.xml status=0 jobs alone
   jobs=$(jobs_count)
-  ((jobs *= 2))  # tests that compute take two (tests/CMakeLists.txt); the others wait, for aircraft, pages and leases that live in real time
+  ((jobs *= 4))  # a test that computes takes four (tests/CMakeLists.txt); the others wait, for aircraft, pages and leases that live in real time
   rm -f "$junit" "$second"
   say "testing"
   ${fixed[@]+"${fixed[@]}"} ctest --test-dir "$folder" --output-on-failure --no-tests=error -j "$jobs" \

@@ -6,6 +6,8 @@
 #include <cstdio>
 #include <numbers>
 
+#include "core/base/axes.hpp"
+
 namespace anchord::floor_plan {
 namespace {
 
@@ -42,7 +44,7 @@ Cloud cloud(std::span<const PixelPair> pairs, const Of& of) {
     const Eigen::Vector2d from_centre = of(pair) - out.centre;
     scatter += from_centre * from_centre.transpose() / n;
   }
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> eigen(scatter, Eigen::EigenvaluesOnly);
+  const auto eigen = axes_of<2>(scatter, Eigen::EigenvaluesOnly);
   out.spread = eigen.eigenvalues().reverse().cwiseMax(0).cwiseSqrt();
   return out;
 }

@@ -8,6 +8,7 @@
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "core/base/axes.hpp"
 #include "core/base/median.hpp"
 
 namespace anchord::floor_plan {
@@ -41,7 +42,7 @@ Face fit(const Points& points, const Eigen::Vector2d& begin, const Eigen::Vector
   for (const auto& p : points) face.at_m += p / static_cast<double>(points.size());
   Eigen::Matrix2d scatter = Eigen::Matrix2d::Zero();
   for (const auto& p : points) scatter += (p - face.at_m) * (p - face.at_m).transpose();
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> eigen(scatter);
+  const auto eigen = axes_of<2>(scatter);
   const Eigen::Vector2d chord = end - begin;
   face.along = points.size() > 4 ? Eigen::Vector2d(eigen.eigenvectors().col(1)) : chord.normalized();
   if (face.along.dot(chord) < 0) face.along = -face.along;

@@ -1,8 +1,9 @@
 #include "core/planning/gdop.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <cmath>
 #include <string>
+
+#include "core/base/axes.hpp"
 
 namespace anchord::planning {
 namespace {
@@ -22,7 +23,7 @@ Error unseen_direction(std::size_t count) {
 /// tr N^-1 from the eigenvalues; +infinity when singular.
 template <int Dim>
 double trace_of_inverse(const Square<Dim>& normal, std::size_t count) {
-  const Eigen::SelfAdjointEigenSolver<Square<Dim>> eigen(normal, Eigen::EigenvaluesOnly);
+  const auto eigen = axes_of<Dim>(normal, Eigen::EigenvaluesOnly);
   if (!(eigen.eigenvalues()[0] > 0)) return INFINITY;
   const double trace = eigen.eigenvalues().cwiseInverse().sum();
   return trace < k_singular_trace / static_cast<double>(count) ? trace : INFINITY;
@@ -70,7 +71,7 @@ Result<Gdop> Geometry<Dim>::with(const Point<Dim>& candidate) const {
 
 template <int Dim>
 typename Geometry<Dim>::Update Geometry<Dim>::update() const {
-  const Eigen::SelfAdjointEigenSolver<Square<Dim>> eigen(normal_);
+  const auto eigen = axes_of<Dim>(normal_);
   const Point<Dim> l = eigen.eigenvalues().cwiseMax(0.0);  // rounding may push a zero below zero
   const Square<Dim>& q = eigen.eigenvectors();
   Point<Dim> adjugate, numerator;
