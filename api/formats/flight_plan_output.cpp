@@ -3,10 +3,11 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <numbers>
+#include <utility>
 
-#include "api/formats/mission_item.hpp"
 #include "core/base/to_wire.hpp"
 #include "core/geo/enu.hpp"
+#include "core/planning/local_plan.hpp"
 
 namespace anchord::api {
 namespace {
@@ -91,63 +92,28 @@ std::string flight_plan_geojson(const planning::FlightPlan& plan, const Wgs84& o
   return to_wire(out, 2) + "\n";
 }
 
-std::string flight_plan_qgc(const planning::FlightPlan& plan, const Wgs84& origin,
-                            const planning::Polygon& outline, const planning::FlightPlanOptions& options) {
-  using namespace mission_item;
+Plan flight_as_plan(const planning::FlightPlan& flight, const planning::FlightPlanInput& input,
+                    const Wgs84& origin, const planning::FlightPlanOptions& options) {
   const EnuFrame frame(origin);
-  Ordered items = Ordered::array();
-  const auto put = [&](int command, int mav_frame, Ordered params, double altitude) {
-    Ordered item;
-    item["type"] = "SimpleItem";
-    item["AMSLAltAboveTerrain"] = nullptr;
-    item["Altitude"] = altitude;
-    item["AltitudeMode"] = 1;  // relative to the launch point
-    item["autoContinue"] = true;
-    item["command"] = command;
-    item["doJumpId"] = items.size() + 1;
-    item["frame"] = mav_frame;
-    item["params"] = std::move(params);
-    items.push_back(item);
+  const auto area = [&](const planning::Polygon& polygon) {
+    GeoPolygon out;
+    for (const auto& corner : polygon) {
+      const auto at = place_of(frame, corner);
+      out.push_back({at.lon_deg, at.lat_deg});
+    }
+    return out;
   };
-  Ordered home = {origin.lat_deg, origin.lon_deg, 0};
-  if (!plan.waypoints.empty()) {
-    const auto& first = plan.waypoints.front();
-    const auto at = place_of(frame, first.point_m.head<2>());
-    home = {at.lat_deg, at.lon_deg, 0};
-    put(k_takeoff, k_frame_relative, {0, 0, 0, nullptr, at.lat_deg, at.lon_deg, first.point_m.z()},
-        first.point_m.z());
-  }
-  for (const auto& w : plan.waypoints) {
-    const auto at = place_of(frame, w.point_m.head<2>());
-    put(k_waypoint, k_frame_relative,
-        {w.measure ? options.dwell_s : 0.0, 0, 0, heading_deg(w), at.lat_deg, at.lon_deg, w.point_m.z()},
-        w.point_m.z());
-  }
-  put(k_return, k_frame_mission, {0, 0, 0, 0, 0, 0, 0}, 0);
-
-  Ordered corners = Ordered::array();
-  for (const auto& corner : outline) {
-    const auto at = place_of(frame, corner);
-    corners.push_back({at.lat_deg, at.lon_deg});
-  }
-  Ordered out;
-  out["fileType"] = "Plan";
-  out["groundStation"] = "QGroundControl";
-  out["version"] = 1;
-  out["geoFence"] = {
-      {"circles", Ordered::array()},
-      {"polygons", Ordered::array({{{"inclusion", false}, {"polygon", corners}, {"version", 1}}})},
-      {"version", 2}};
-  out["rallyPoints"] = {{"points", Ordered::array()}, {"version", 2}};
-  out["mission"] = {{"version", 2},
-                    {"firmwareType", 12},  // MAV_AUTOPILOT_PX4; every item here means the same to ArduPilot
-                    {"vehicleType", 2},    // MAV_TYPE_QUADROTOR
-                    {"globalPlanAltitudeMode", 1},
-                    {"cruiseSpeed", options.speed_mps},
-                    {"hoverSpeed", options.speed_mps},
-                    {"plannedHomePosition", home},
-                    {"items", items}};
-  return to_wire(out, 2) + "\n";
+  Plan plan;
+  plan.origin = origin;
+  plan.outline = area(input.outline);
+  plan.fence = area(input.fence);
+  for (const auto& polygon : input.no_fly) plan.no_fly.push_back(area(polygon));
+  plan.building_height_m = input.building_height_m;
+  plan.settings.keep_out_m = options.keep_out_m;
+  plan.settings.speed_mps = options.speed_mps;
+  plan.settings.dwell_s = options.dwell_s;
+  plan.settings.turn = plan.settings.height_search = false;
+  return planning::with_waypoints(std::move(plan), flight, origin);
 }
 
 }  // namespace anchord::api

@@ -138,25 +138,9 @@ class OutlineReader {
     }
     if (area.corners.size() > 1 && area.corners.front() == area.corners.back()) area.corners.pop_back();
     if (area.corners.size() < 3) return fail(at + "/0", "out_of_range", "needs 3 different corners");
-    if (crosses_itself(area.corners))
+    if (planning::crosses_itself(area.corners))
       return fail(at + "/0", "self_crossing", "the ring crosses itself; give the corners in order round it");
     areas.push_back(std::move(area));
-  }
-
-  static bool crosses_itself(const std::vector<Corner>& ring) {
-    const std::size_t n = ring.size();
-    if (n > 2000) return false;  // a survey, not a slip of the mouse; the square of it would take seconds
-    const auto side = [](const Corner& a, const Corner& b, const Corner& p) {
-      return (b.x() - a.x()) * (p.y() - a.y()) - (b.y() - a.y()) * (p.x() - a.x());
-    };
-    for (std::size_t i = 0; i < n; ++i) {
-      for (std::size_t j = i + 2; j < n; ++j) {
-        if (i == 0 && j + 1 == n) continue;
-        const auto &a = ring[i], &b = ring[(i + 1) % n], &c = ring[j], &d = ring[(j + 1) % n];
-        if (side(a, b, c) * side(a, b, d) < 0 && side(c, d, a) * side(c, d, b) < 0) return true;
-      }
-    }
-    return false;
   }
 
   void read_properties(const Json& properties, const std::string& at, Area& area) {

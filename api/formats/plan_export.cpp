@@ -49,9 +49,27 @@ Ordered area_feature(const GeoPolygon& polygon, const char* kind) {
           {"properties", {{"kind", kind}}}};
 }
 
+void put_waypoint(Items& items, const PlanWaypoint& w, const PlanSettings& settings, Autopilot autopilot) {
+  constexpr double k_turn_deg = 360, k_turn_deg_per_s = 30;
+  const double hold_s = w.measure ? w.dwell_s.value_or(settings.dwell_s) : 0;
+  const auto heading = w.heading_deg ? Ordered(*w.heading_deg) : Ordered(nullptr);
+  items.put(k_waypoint, k_frame_relative, {hold_s, 0, 0, heading, w.at.lat_deg, w.at.lon_deg, w.height_m},
+            w.height_m);
+  // PX4 turns to the heading of the waypoint, and refuses a mission with the items that ArduPilot needs for
+  // it.
+  if (autopilot == Autopilot::px4) return;
+  if (w.heading_deg) items.put(k_yaw, k_frame_mission, {*w.heading_deg, 0, 0, 0, 0, 0, 0}, 0);
+  if (!w.turn) return;
+  // ArduPilot begins to turn when it sets off to the item before: one that stays where it is.
+  items.put(k_loiter_time, k_frame_relative,
+            {k_turn_deg / k_turn_deg_per_s, 0, 0, nullptr, w.at.lat_deg, w.at.lon_deg, w.height_m},
+            w.height_m);
+  items.put(k_yaw, k_frame_mission, {k_turn_deg, k_turn_deg_per_s, 1, 1, 0, 0, 0}, 0);
+}
+
 }  // namespace
 
-Result<std::string> plan_qgc(const Plan& plan) {
+Result<std::string> plan_qgc(const Plan& plan, Autopilot autopilot) {
   BOOST_OUTCOME_TRY(const auto origin, planning::plan_origin(plan));
   LonLat home{origin.lon_deg, origin.lat_deg};
   Items items;
@@ -61,15 +79,9 @@ Result<std::string> plan_qgc(const Plan& plan) {
     items.put(k_takeoff, k_frame_relative, {0, 0, 0, nullptr, home.lat_deg, home.lon_deg, first.height_m},
               first.height_m);
   }
-  for (const auto& w : plan.waypoints) {
-    const double hold_s = w.measure ? w.dwell_s.value_or(plan.settings.dwell_s) : 0;
-    items.put(k_waypoint, k_frame_relative,
-              {hold_s, 0, 0, w.heading_deg ? Ordered(*w.heading_deg) : Ordered(nullptr), w.at.lat_deg,
-               w.at.lon_deg, w.height_m},
-              w.height_m);
-    // 360 degrees, 30 degrees a second, clockwise, relative to where the nose is.
-    if (w.turn) items.put(k_yaw, k_frame_mission, {360, 30, 1, 1, 0, 0, 0}, 0);
-  }
+  // Ground speed; what is planned beside a building is not flown at the autopilot's own.
+  items.put(k_speed, k_frame_mission, {1, plan.settings.speed_mps, -1, 0, 0, 0, 0}, 0);
+  for (const auto& w : plan.waypoints) put_waypoint(items, w, plan.settings, autopilot);
   items.put(k_return, k_frame_mission, {0, 0, 0, 0, 0, 0, 0}, 0);
 
   Ordered polygons = Ordered::array();
@@ -83,8 +95,9 @@ Result<std::string> plan_qgc(const Plan& plan) {
   out["geoFence"] = {{"circles", Ordered::array()}, {"polygons", std::move(polygons)}, {"version", 2}};
   out["rallyPoints"] = {{"points", Ordered::array()}, {"version", 2}};
   out["mission"] = {{"version", 2},
-                    {"firmwareType", 3},  // MAV_AUTOPILOT_ARDUPILOTMEGA; every item means the same to PX4
-                    {"vehicleType", 2},   // MAV_TYPE_QUADROTOR
+                    {"firmwareType",
+                     autopilot == Autopilot::px4 ? 12 : 3},  // MAV_AUTOPILOT_PX4, MAV_AUTOPILOT_ARDUPILOTMEGA
+                    {"vehicleType", 2},                      // MAV_TYPE_QUADROTOR
                     {"globalPlanAltitudeMode", 1},
                     {"cruiseSpeed", plan.settings.speed_mps},
                     {"hoverSpeed", plan.settings.speed_mps},

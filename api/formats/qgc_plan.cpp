@@ -1,8 +1,11 @@
 #include "api/formats/qgc_plan.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <numbers>
+#include <optional>
+#include <utility>
 
 #include "api/formats/mission_item.hpp"
 #include "core/geo/enu.hpp"
@@ -131,6 +134,65 @@ std::optional<Item> read_item(const Json& json, const std::string& at, std::vect
   return Item{command->get<int>(), in_frame, params};
 }
 
+constexpr double k_same_place_m = 0.1, k_most_dwell_s = 600;
+
+bool same_place(const PlanWaypoint& a, const PlanWaypoint& b) {
+  const EnuFrame frame({a.at.lat_deg, a.at.lon_deg, 0});
+  return frame.enu_from_wgs84({b.at.lat_deg, b.at.lon_deg, 0}).m.head<2>().norm() < k_same_place_m &&
+         std::abs(a.height_m - b.height_m) < k_same_place_m;
+}
+
+/// Time that is spent at the last waypoint; none is measured in less.
+void add_dwell(Plan& plan, double seconds) {
+  if (plan.waypoints.empty()) return;
+  auto& w = plan.waypoints.back();
+  const double dwell_s = std::min(w.dwell_s.value_or(0) + seconds, k_most_dwell_s);
+  w.measure = dwell_s > 0;
+  w.dwell_s = w.measure ? std::optional(dwell_s) : std::nullopt;
+}
+
+/// A change of yaw: a whole turn, or the heading of the waypoint before it. `loitered_s`: of an item that
+/// only stays where the waypoint before it is, for the time of the turn.
+void read_yaw(const Item& item, const std::string& at, double loitered_s, Plan& plan,
+              std::vector<std::string>& notes) {
+  const Json& p = *item.params;
+  if (plan.waypoints.empty() || !p[0].is_number()) return;
+  auto& w = plan.waypoints.back();
+  const double angle_deg = p[0].get<double>();
+  const bool relative = p[3].is_number() && p[3].get<double>() > 0;
+  if (!relative) {
+    w.heading_deg = std::fmod(std::fmod(angle_deg, 360) + 360, 360);
+  } else if (std::abs(angle_deg) >= 360) {
+    w.turn = true;
+    add_dwell(plan, -loitered_s);
+  } else {
+    notes.push_back(
+        at + " turns by part of a circle from where the nose is: left out, headings are those of waypoints");
+  }
+}
+
+void read_speed(const Item& item, const std::string& at, Plan& plan, bool& known,
+                std::vector<std::string>& notes) {
+  const Json& speed = (*item.params)[1];
+  if (!speed.is_number() || !(speed.get<double>() >= 0.1 && speed.get<double>() <= 15)) return;
+  if (known && speed.get<double>() != plan.settings.speed_mps) {
+    notes.push_back(at + " changes the speed on the way: left out, a plan is flown at one speed");
+    return;
+  }
+  plan.settings.speed_mps = speed.get<double>();
+  known = true;
+}
+
+/// A command that the procedure has no use for, in words that say what of the flight is missing.
+std::string left_out(const std::string& at, const Item& item) {
+  const auto place = lat_lon((*item.params)[4], (*item.params)[5]);
+  const bool somewhere =
+      item.command <= k_last_flown && place && (place->lat_deg != 0 || place->lon_deg != 0);
+  return at + " has command " + std::to_string(item.command) +
+         " of MAVLink, which a calibration flight does not use: left out" +
+         (somewhere ? ", and its place is not flown to: make it a waypoint where it is to be" : "");
+}
+
 void read_waypoint(const Item& item, const std::string& at, double home_m, Plan& plan,
                    std::vector<FieldError>& errors) {
   const Json& p = *item.params;
@@ -148,12 +210,29 @@ void read_waypoint(const Item& item, const std::string& at, double home_m, Plan&
   if (!(w.height_m >= 0 && w.height_m <= 500)) {
     return fail(errors, at + "/params/6", "out_of_range", "the height above home must be 0 to 500 m");
   }
-  if (p[0].is_number() && p[0].get<double>() >= 0 && p[0].get<double>() <= 600) {
+  if (p[0].is_number() && p[0].get<double>() >= 0 && p[0].get<double>() <= k_most_dwell_s) {
     w.measure = p[0].get<double>() > 0;
     if (w.measure) w.dwell_s = p[0].get<double>();
   }
   if (p[3].is_number()) w.heading_deg = std::fmod(std::fmod(p[3].get<double>(), 360) + 360, 360);
   plan.waypoints.push_back(w);
+}
+
+/// A place to stay at: a waypoint, or where it is that of the one before it, time there. Returns the seconds
+/// of the latter.
+double read_loiter(const Item& item, const std::string& at, double home_m, Plan& plan,
+                   std::vector<FieldError>& errors) {
+  const std::size_t before = plan.waypoints.size();
+  read_waypoint(item, at, home_m, plan, errors);
+  if (plan.waypoints.size() < 2 || plan.waypoints.size() == before) return 0;
+  const PlanWaypoint loiter = plan.waypoints.back();
+  if (!same_place(plan.waypoints[before - 1], loiter)) {
+    plan.waypoints.back().heading_deg.reset();  // its fourth parameter is not a heading
+    return 0;
+  }
+  plan.waypoints.pop_back();
+  add_dwell(plan, loiter.dwell_s.value_or(0));
+  return loiter.dwell_s.value_or(0);
 }
 
 }  // namespace
@@ -172,20 +251,31 @@ Plan read_qgc_plan(const Json& file, std::vector<std::string>& notes, std::vecto
   if (speed != nullptr && speed->is_number() && speed->get<double>() >= 0.1 && speed->get<double>() <= 15) {
     plan.settings.speed_mps = speed->get<double>();
   }
+  bool speed_known = false;
+  double loitered_s = 0;
   for (std::size_t i = 0; i < items->size(); ++i) {
     const std::string at = "/mission/items/" + std::to_string(i);
     const auto item = read_item((*items)[i], at, notes, errors);
     if (!item) continue;
-    if (item->command == k_waypoint) {
+    const double stayed_s = std::exchange(loitered_s, 0);
+    if (item->command == k_waypoint || item->command == k_spline) {
       read_waypoint(*item, at, home_m, plan, errors);
+      if (item->command == k_spline)
+        notes.push_back(at + " is a spline waypoint: it is flown to in a straight line");
+    } else if (item->command == k_loiter_time) {
+      loitered_s = read_loiter(*item, at, home_m, plan, errors);
+    } else if (item->command == k_delay) {
+      if (const Json& s = (*item->params)[0]; s.is_number() && s.get<double>() > 0)
+        add_dwell(plan, s.get<double>());
+    } else if (item->command == k_speed) {
+      read_speed(*item, at, plan, speed_known, notes);
     } else if (item->command == k_yaw) {
-      if (!plan.waypoints.empty()) plan.waypoints.back().turn = true;
+      read_yaw(*item, at, stayed_s, plan, notes);
     } else if (item->command >= k_fence_first && item->command <= k_fence_last) {
       fail(errors, at + "/command", "unknown_value",
            "is a fence among the mission items: draw it in geoFence (version 2)");
     } else if (item->command != k_takeoff && item->command != k_return && item->command != k_land) {
-      notes.push_back(at + " has command " + std::to_string(item->command) +
-                      ", which a calibration flight does not use");
+      notes.push_back(left_out(at, *item));
     }
   }
   if (const Json* fence = member(file, "geoFence")) {

@@ -92,6 +92,7 @@ void read_settings(const Json& json, PlanSettings& s, std::vector<FieldError>& e
   if (const auto value = f.number("target_gdop", 0.1, 1000)) s.target_gdop = *value;
   if (const auto value = f.number("max_flight_s", 10, 14'400)) s.max_flight_s = *value;
   take(f.number("min_battery", 0.1, 0.95), s.min_battery);
+  take(f.number("endurance_s", 60, 86'400), s.endurance_s);
   if (!(s.min_height_m < s.max_height_m)) {
     f.error("max_height_m", "out_of_range", "must be above min_height_m");
   }
@@ -168,7 +169,8 @@ Ordered settings_json(const PlanSettings& s) {
           {"target_sigma_m", s.target_sigma_m},
           {"target_gdop", or_null(s.target_gdop)},
           {"max_flight_s", or_null(s.max_flight_s)},
-          {"min_battery", s.min_battery}};
+          {"min_battery", s.min_battery},
+          {"endurance_s", s.endurance_s}};
 }
 
 Ordered document_json(const Plan& plan) {
@@ -293,7 +295,10 @@ Ordered plan_check_json(const planning::PlanCheck& check) {
                          {"sigma_m", check.predicted_sigma_m[i]},
                          {"gdop", gdop ? Ordered(*gdop) : Ordered(nullptr)}});
     }
-    predicted = {{"rms_m", check.rms_m}, {"worst_m", check.worst_m}, {"anchors", std::move(anchors)}};
+    predicted = {{"rms_m", check.rms_m},
+                 {"worst_m", check.worst_m},
+                 {"n_out_of_range", check.n_out_of_range},
+                 {"anchors", std::move(anchors)}};
   }
   return {{"flyable", check.flyable()},         {"issues", std::move(issues)},
           {"length_m", check.length_m},         {"duration_s", check.time.expected_s},

@@ -142,11 +142,10 @@ Response generate(PlanningApi& s, const Request& request) {
     errors.push_back({"/outline", "required", "the waypoints are computed from it"});
   refuse_if_any(errors);
   value_or_problem(s.structures.join(plan));
-  const Plan made = value_or_problem(planning::generate_waypoints(plan));
-  const auto check = value_or_problem(planning::check_plan(made));
-  auto out = plan_json(made);
+  const auto made = value_or_problem(planning::generate_waypoints(plan));
+  auto out = plan_json(made.plan);
   for (const char* key : {"id", "revision", "created_at", "changed_at"}) out.erase(key);
-  return json_response(200, Ordered{{"plan", std::move(out)}, {"check", plan_check_json(check)}});
+  return json_response(200, Ordered{{"plan", std::move(out)}, {"check", plan_check_json(made.check)}});
 }
 
 Response import(PlanningApi& s, const Request& request) {
@@ -172,12 +171,13 @@ Response import(PlanningApi& s, const Request& request) {
 }
 
 Response export_plan(PlanningApi& s, const Request& request) {
-  check_query(request, {"format"});
+  check_query(request, {"format", "autopilot"});
   const Plan plan = load(s, request);
+  const auto autopilot = query_word(request, "autopilot", k_autopilot_words).value_or(Autopilot::ardupilot);
   const auto format = request.query_value("format").value_or("plan");
   Response response;
   if (format == "plan") {
-    response.body = value_or_problem(plan_qgc(plan));
+    response.body = value_or_problem(plan_qgc(plan, autopilot));
     response.header("Content-Type", "application/json");
   } else if (format == "geojson") {
     response.body = value_or_problem(plan_geojson(plan));

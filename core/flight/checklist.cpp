@@ -20,9 +20,9 @@ constexpr std::array<std::string_view, 13> k_by_itself{
     "tag",   "plan",    "place",  "disk",       "recording", "fence"};
 constexpr double k_fresh_s = 5;  ///< nothing is green on older telemetry
 
-std::string words(const char* format, double value) {
-  std::array<char, 120> out{};
-  std::snprintf(out.data(), out.size(), format, value);
+std::string words(const char* format, double value, double other = 0) {
+  std::array<char, 200> out{};
+  std::snprintf(out.data(), out.size(), format, value, other);
   return out.data();
 }
 
@@ -58,7 +58,31 @@ ChecklistItem station_item(const OtherOnLink& same) {
                   "system id (QGroundControl: Application Settings, MAVLink, Ground Station ID)");
 }
 
+ChecklistItem battery_item(const DroneStatus& d, const ChecklistFacts& f) {
+  const double flight_s = f.plan != nullptr ? f.plan->time.expected_s : 0;
+  const double need = battery_need(flight_s, f.endurance_s, f.min_battery);
+  const bool fresh = d.battery && d.battery_age_s < k_fresh_s;
+  std::string text = "unknown";
+  if (d.battery_warning > 0)
+    text = "the autopilot reports a battery warning";
+  else if (fresh && need > 1)
+    text = words(
+        "the flight of %.0f min and its reserve need more than the %.0f min of a full battery: "
+        "divide the plan, or correct its endurance_s",
+        flight_s / 60, f.endurance_s / 60);
+  else if (fresh)
+    text = words("%.0f %% left, %.0f %% needed", 100 * *d.battery, 100 * need) +
+           words(" (a full one is taken to last %.0f min)", f.endurance_s / 60);
+  return item("battery", "The battery covers the plan plus 30 % reserve",
+              fresh && d.battery_warning == 0 && *d.battery >= need, true, text);
+}
+
 }  // namespace
+
+double battery_need(double flight_s, double endurance_s, double min_battery) {
+  constexpr double k_margin = 1.3;
+  return min_battery + k_margin * flight_s / endurance_s;
+}
 
 std::vector<ChecklistItem> make_checklist(const ChecklistFacts& f) {
   std::vector<ChecklistItem> out;
@@ -92,16 +116,7 @@ std::vector<ChecklistItem> make_checklist(const ChecklistFacts& f) {
                        : parameters.complete
                            ? std::to_string(d.parameters.size()) + " parameters read, all as required"
                            : "being read"));
-    // What the flight may use is what is above the reserve; 30 % of it stays as a margin.
-    const double need =
-        std::min(f.min_battery + 1.3 * (f.plan != nullptr ? f.plan->time.expected_s : 0) / 1200, 0.95);
-    out.push_back(
-        item("battery", "The battery covers the plan plus 30 % reserve",
-             d.battery && d.battery_age_s < k_fresh_s && d.battery_warning == 0 && *d.battery >= need, true,
-             d.battery_warning > 0 ? "the autopilot reports a battery warning"
-             : d.battery && d.battery_age_s < k_fresh_s
-                 ? words("%.0f %% left, ", 100 * *d.battery) + words("%.0f %% needed", 100 * need)
-                 : "unknown"));
+    out.push_back(battery_item(d, f));
   }
   out.push_back(item(
       "rtk", "RTK has been fixed for 10 s", f.fixed_for_s && *f.fixed_for_s >= 10 && *f.fix_age_s < 2, true,

@@ -34,6 +34,7 @@ struct ChecklistFacts {
   double disk_free_bytes{};
   bool writable{true};
   double min_battery{0.3};
+  double endurance_s{1200};  ///< on a full battery
   /// What keeps the aircraft from taking off where it stands; empty: nothing. Absent: not known where it is.
   std::optional<std::string> place_refused{};
 };
@@ -41,5 +42,9 @@ struct ChecklistFacts {
 /// Every item, in the order of the screen. Start is blocked until all are green.
 std::vector<ChecklistItem> make_checklist(const ChecklistFacts& facts);
 bool is_checklist_item(std::string_view id);
+
+/// Share of the battery that a flight of so many seconds needs: what it uses with a margin of 30 %, above
+/// what it returns at. Above 1: no battery is enough.
+double battery_need(double flight_s, double endurance_s, double min_battery);
 
 }  // namespace anchord::flight

@@ -82,7 +82,10 @@ std::vector<ChecklistItem> Operations::checklist(const Now& now, const Mission* 
   const Plan* plan = ground.plan;
   ChecklistFacts facts;
   facts.mission = record;
-  if (plan != nullptr) facts.min_battery = plan->settings.min_battery;
+  if (plan != nullptr) {
+    facts.min_battery = plan->settings.min_battery;
+    facts.endurance_s = plan->settings.endurance_s;
+  }
   facts.plan = ground.check.get();
   if (!manual && drone_ != nullptr) facts.drone = drone_->status();
   if (const auto it = received_.find(mission); it != received_.end()) {

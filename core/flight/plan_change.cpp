@@ -7,6 +7,7 @@
 #include <cstdio>
 #include <utility>
 
+#include "core/flight/checklist.hpp"
 #include "core/planning/flight_time.hpp"
 #include "core/planning/route.hpp"
 #include "core/procedure/safety.hpp"
@@ -17,7 +18,6 @@ namespace {
 using procedure::Step;
 
 constexpr std::size_t k_most_reasons = 6;
-constexpr double k_reserve = 1.3, k_battery_s = 1200;  ///< as the checklist has them
 
 std::string words(const char* format, double a, double b = 0) {
   std::array<char, 200> out{};
@@ -117,7 +117,7 @@ void note(const ChangeBasis& now, const Plan& wanted, PlanProposal& out) {
         words("The flight is expected to take %.0f s; at the limit of %.0f s it returns unfinished",
               now.flown_s + out.after_s.expected_s, *limit));
   const double need =
-      std::min(wanted.settings.min_battery + k_reserve * out.after_s.expected_s / k_battery_s, 0.95);
+      battery_need(out.after_s.expected_s, wanted.settings.endurance_s, wanted.settings.min_battery);
   if (now.battery && *now.battery < need)
     out.notes.push_back(
         words("The battery is at %.0f %%, the rest of the flight needs %.0f %% with 30 %% reserve: it may "

@@ -119,6 +119,19 @@ double distance_to_edge_m(const Polygon& polygon, const Vector2d& point) {
   return out;
 }
 
+bool crosses_itself(const Polygon& polygon) {
+  const std::size_t n = polygon.size();
+  if (n > 2000) return false;  // the square of it would take seconds
+  for (std::size_t i = 0; i < n; ++i) {
+    for (std::size_t j = i + 2; j < n; ++j) {
+      if (i == 0 && j + 1 == n) continue;
+      const auto &a = polygon[i], &b = polygon[(i + 1) % n], &c = polygon[j], &d = polygon[(j + 1) % n];
+      if (side_of(a, b, c) * side_of(a, b, d) < 0 && side_of(c, d, a) * side_of(c, d, b) < 0) return true;
+    }
+  }
+  return false;
+}
+
 bool covers(const Polygon& outer, const Polygon& inner, double slack_m) {
   constexpr double k_step_m = 0.5;
   bool all = outer.size() >= 3 && !inner.empty();

@@ -5,9 +5,11 @@
 #include <cmath>
 #include <cstdio>
 #include <limits>
+#include <map>
 #include <tuple>
 #include <utility>
 
+#include "core/base/cross.hpp"
 #include "core/planning/design.hpp"
 #include "core/planning/route.hpp"
 
@@ -20,21 +22,13 @@ using Eigen::Vector3d;
 constexpr double k_unreachable_m = std::numeric_limits<double>::infinity();
 /// The ring lies so far beyond the keep-out that the chords round a corner, 3 m apart, stay outside it.
 constexpr double k_ring_margin_m = 0.35;
+/// A building has room for an anchor where a grid of this finds none inside it: there is none.
+constexpr double k_finest_grid_m = 0.1;
 
 struct Candidate {
   Vector3d point_m;
   double along{};  ///< place round the building, 0..1
 };
-
-/// Whether enough of the flight could range it: four points at least.
-bool in_range(const Vector3d& anchor, const std::vector<Candidate>& all, double max_range_m) {
-  constexpr int k_needed = 4;
-  int seen = 0;
-  for (const auto& c : all) {
-    if ((c.point_m - anchor).norm() <= max_range_m && ++seen >= k_needed) return true;
-  }
-  return false;
-}
 
 /// A grid inside the outline. What nothing outside can range is counted and left out: it cannot be found
 /// whatever is flown, and would drown the others in the mean.
@@ -48,9 +42,13 @@ std::vector<Vector3d> assumed_anchors(const FlightPlanInput& input, const Flight
   std::vector<double> heights;
   for (double z = 2.5; z < std::max(input.building_height_m, 2.6); z += options.floor_m) heights.push_back(z);
   const double reach_m = options.max_range_m - options.keep_out_m;
+  std::vector<Vector3d> points;
+  for (const auto& c : all) points.push_back(c.point_m);
   std::vector<Vector3d> out;
-  // A large hall gets a wider grid, not more anchors.
-  for (double spacing = options.anchor_spacing_m;; spacing *= 1.3) {
+  // A large hall gets a wider grid, not more anchors; a narrow or slanted one a finer grid until a place lies
+  // inside.
+  double spacing = options.anchor_spacing_m, wider = 1.3;
+  for (;; spacing *= wider) {
     out.clear();
     n_out_of_range = 0;
     const auto count = [&](double length) {
@@ -70,9 +68,13 @@ std::vector<Vector3d> assumed_anchors(const FlightPlanInput& input, const Flight
       }
     }
     const bool too_many = static_cast<int>(near.size()) > options.max_anchors && nx * ny > 1;
-    if (too_many) continue;
+    if (too_many && wider > 1) continue;
+    if (near.empty() && n_out_of_range == 0 && spacing > k_finest_grid_m) {
+      wider = 0.5;
+      continue;
+    }
     for (const auto& anchor : near) {
-      if (in_range(anchor, all, options.max_range_m))
+      if (in_range(anchor, points, options.max_range_m))
         out.push_back(anchor);
       else
         ++n_out_of_range;
@@ -94,7 +96,9 @@ std::vector<Candidate> candidates(const FlightPlanInput& input, const FlightPlan
       for (const double z : heights) {
         const Candidate c{{ring[i].x(), ring[i].y(), z},
                           static_cast<double>(i) / static_cast<double>(ring.size())};
-        if (!refuse_point(bounds, c.point_m)) out.push_back(c);
+        const bool near_fence = bounds.fence.size() >= 3 &&
+                                distance_to_edge_m(bounds.fence, c.point_m.head<2>()) < k_fence_margin_m;
+        if (!near_fence && !refuse_point(bounds, c.point_m)) out.push_back(c);
       }
     }
   }
@@ -196,14 +200,26 @@ std::vector<Vector3d> way_round(const std::vector<Candidate>& ring, const Bounds
   return best;
 }
 
+/// Of the area, not of the corners: a finely drawn side does not draw it near.
+Vector2d centroid(const Polygon& outline) {
+  const Vector2d base = outline.front();
+  Vector2d sum{0, 0};
+  double twice_area_m2 = 0;
+  for (std::size_t i = 0; i < outline.size(); ++i) {
+    const Vector2d a = outline[i] - base, b = outline[(i + 1) % outline.size()] - base;
+    twice_area_m2 += cross(a, b);
+    sum += cross(a, b) * (a + b);
+  }
+  return base + sum / (3 * twice_area_m2);
+}
+
 Result<void> order(FlightPlan& plan, std::vector<Candidate> chosen, const FlightPlanInput& input,
                    const FlightPlanOptions& options, const Bounds& bounds) {
   std::sort(chosen.begin(), chosen.end(), [](const Candidate& a, const Candidate& b) {
     return std::tuple(a.along, a.point_m.z(), a.point_m.x()) <
            std::tuple(b.along, b.point_m.z(), b.point_m.x());
   });
-  Vector2d middle{0, 0};
-  for (const auto& corner : input.outline) middle += corner / static_cast<double>(input.outline.size());
+  const Vector2d middle = centroid(input.outline);
   std::vector<Candidate> ring;
   for (const auto& p : ring_around(input.outline, options.keep_out_m + k_ring_margin_m, options.spacing_m)) {
     const Candidate c{{p.x(), p.y(), bounds.min_height_m.value_or(0)}, 0};
@@ -238,15 +254,76 @@ Result<void> order(FlightPlan& plan, std::vector<Candidate> chosen, const Flight
   return boost::outcome_v2::success();
 }
 
-/// Points of a pocket that nothing legal leads out of are given up; the larger part is flown.
-std::vector<Candidate> joined(const std::vector<Candidate>& chosen, const Bounds& bounds) {
-  std::vector<Candidate> with, without;
-  for (const auto& c : chosen)
-    (route(bounds, chosen.front().point_m, c.point_m) ? with : without).push_back(c);
-  return with.size() >= without.size() || without.empty() ? with : joined(without, bounds);
+/// Outside the convex hull of the outline: all of it lies to the left of one of its corners, seen from there.
+bool round_the_building(const Polygon& outline, const Vector2d& p) {
+  return std::ranges::any_of(outline, [&](const Vector2d& corner) {
+    return std::ranges::all_of(outline,
+                               [&](const Vector2d& other) { return cross(corner - p, other - p) >= 0; });
+  });
+}
+
+/// By candidate, the number of its part: those of one part are joined by permitted paths.
+std::vector<std::size_t> parts_of(const std::vector<Candidate>& all, const Bounds& bounds) {
+  const std::size_t none = all.size();
+  std::vector<std::size_t> part(all.size(), none), first;
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    if (part[i] != none) continue;
+    for (std::size_t k = 0; k < first.size() && part[i] == none; ++k)
+      if (route(bounds, all[first[k]].point_m, all[i].point_m)) part[i] = k;
+    if (part[i] == none) {
+      part[i] = first.size();
+      first.push_back(i);
+    }
+    // All that is seen from there, and from what is seen: a route is looked for once a part, not once a
+    // candidate.
+    std::vector<std::size_t> open{i};
+    while (!open.empty()) {
+      const auto here = open.back();
+      open.pop_back();
+      for (std::size_t j = 0; j < all.size(); ++j) {
+        if (part[j] != none || refuse_path(bounds, all[here].point_m, all[j].point_m)) continue;
+        part[j] = part[i];
+        open.push_back(j);
+      }
+    }
+  }
+  return part;
+}
+
+/// The candidates of one part of what may be flown, for no permitted path leads to the others: of the part
+/// with most places round the building, for the aircraft comes from there and not from a courtyard; where a
+/// fence leaves none, of the largest.
+std::vector<Candidate> reachable(std::vector<Candidate> all, const FlightPlanInput& input,
+                                 const Bounds& bounds) {
+  const auto part = parts_of(all, bounds);
+  std::map<std::size_t, std::pair<int, int>> size;  // round the building, in all
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    auto& [outside, in_all] = size[part[i]];
+    if (round_the_building(input.outline, all[i].point_m.head<2>())) ++outside;
+    ++in_all;
+  }
+  const auto chosen = std::ranges::max_element(size, {}, [](const auto& s) { return s.second; })->first;
+  std::vector<Candidate> out;
+  for (std::size_t i = 0; i < all.size(); ++i)
+    if (part[i] == chosen) out.push_back(all[i]);
+  return out;
 }
 
 }  // namespace
+
+bool in_range(const Vector3d& anchor, const std::vector<Vector3d>& points_m, double max_range_m) {
+  constexpr int k_needed = 4;
+  int seen = 0;
+  for (const auto& p : points_m) {
+    if ((p - anchor).norm() <= max_range_m && ++seen >= k_needed) return true;
+  }
+  return false;
+}
+
+std::string left_out_text(std::size_t n_unreachable) {
+  return std::to_string(n_unreachable) +
+         " places that no permitted path leads to (a courtyard, a pocket between no-fly areas) are left out";
+}
 
 Result<void> FlightPlanOptions::check() const {
   const auto bad = [](const char* text) { return make_error(Errc::invalid_argument, text); };
@@ -285,6 +362,9 @@ Result<FlightPlan> plan_flight(const FlightPlanInput& input, const FlightPlanOpt
       return make_error(Errc::invalid_argument, "a corner of the outline is more than 2 km from its middle");
     }
   }
+  if (crosses_itself(input.outline))
+    return make_error(Errc::invalid_argument,
+                      "the outline crosses itself: give its corners in order round it");
   double twice_area_m2 = 0;
   for (std::size_t i = 0; i < input.outline.size(); ++i) {
     const auto &a = input.outline[i], &b = input.outline[(i + 1) % input.outline.size()];
@@ -299,13 +379,19 @@ Result<FlightPlan> plan_flight(const FlightPlanInput& input, const FlightPlanOpt
   bounds.keep_out_m = options.keep_out_m;
 
   FlightPlan plan;
-  const auto all = candidates(input, options, bounds);
+  auto all = candidates(input, options, bounds);
+  const auto n_permitted = all.size();
+  if (!all.empty()) all = reachable(std::move(all), input, bounds);
   plan.n_candidates = all.size();
+  plan.n_unreachable = n_permitted - all.size();
   if (static_cast<int>(all.size()) < options.min_points) {
     return make_error(Errc::not_found,
                       "only " + std::to_string(all.size()) +
-                          " points to fly to are left by fence, no-fly areas and clearance, need " +
-                          std::to_string(options.min_points));
+                          " points to fly to are left by fence, no-fly areas and clearance" +
+                          (plan.n_unreachable > 0 ? ", and no permitted path leads to " +
+                                                        std::to_string(plan.n_unreachable) + " others"
+                                                  : std::string()) +
+                          ": need " + std::to_string(options.min_points));
   }
   plan.assumed_anchors_m = assumed_anchors(input, options, all, plan.n_out_of_range);
   if (plan.assumed_anchors_m.empty() && plan.n_out_of_range == 0)
@@ -320,15 +406,9 @@ Result<FlightPlan> plan_flight(const FlightPlanInput& input, const FlightPlanOpt
   for (const auto& c : all) sights.push_back(design.sights(c.point_m));
   std::vector<Candidate> chosen;
   for (const auto i : choose(design, sights, options, plan.reason)) chosen.push_back(all[i]);
-  if (!order(plan, chosen, input, options, bounds)) {
-    auto kept = joined(chosen, bounds);
-    for (const auto& c : chosen) design.remove(c.point_m);
-    for (const auto& c : kept) design.add(c.point_m);
-    plan.reason += "; " + std::to_string(chosen.size() - kept.size()) +
-                   " points that no permitted path reaches were left out";
-    plan.waypoints.clear();
-    plan.length_m = 0;
-    BOOST_OUTCOME_TRY(order(plan, std::move(kept), input, options, bounds));
+  BOOST_OUTCOME_TRYV(order(plan, std::move(chosen), input, options, bounds));
+  if (plan.n_unreachable > 0) {
+    plan.reason += "; " + left_out_text(plan.n_unreachable);
   }
   plan.predicted_sigma_m = design.sigmas_m();
   plan.rms_m = std::sqrt(design.mean_square_m2());

@@ -12,6 +12,9 @@
 
 namespace anchord::planning {
 
+/// Waypoints are set no nearer to the fence: what the aircraft drifts in a gust.
+inline constexpr double k_fence_margin_m = 1;
+
 struct FlightPlanInput {
   Polygon outline;  ///< of the building, ENU metres
   double building_height_m = 6;
@@ -60,6 +63,7 @@ struct FlightPlan {
   std::vector<Waypoint> waypoints;  ///< in flying order, closed: the first follows the last
   std::size_t n_measure{};
   std::size_t n_candidates{};
+  std::size_t n_unreachable{};                     ///< places more, to which no permitted path leads
   std::vector<Eigen::Vector3d> assumed_anchors_m;  ///< those that can be ranged from outside
   std::size_t n_out_of_range{};                    ///< the others
   std::vector<double> predicted_sigma_m;  ///< per assumed anchor: root of the summed variance of its position
@@ -77,6 +81,13 @@ struct FlightPlan {
 ///          fly: fence and no-fly leave no candidate; or two points no legal way joins)
 /// threads  pure; deterministic
 Result<FlightPlan> plan_flight(const FlightPlanInput& input, const FlightPlanOptions& options);
+
+/// Whether enough of the flight could range an anchor there: four points at least.
+bool in_range(const Eigen::Vector3d& anchor, const std::vector<Eigen::Vector3d>& points_m,
+              double max_range_m);
+
+/// Says of `FlightPlan::n_unreachable` what it is.
+std::string left_out_text(std::size_t n_unreachable);
 
 /// Points at exactly `distance_m` outside a polygon, in order round it, `spacing_m` apart.
 std::vector<Eigen::Vector2d> ring_around(const Polygon& polygon, double distance_m, double spacing_m);

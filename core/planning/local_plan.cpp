@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstdio>
 #include <numbers>
+#include <utility>
 
 #include "core/geo/enu.hpp"
 #include "core/planning/design.hpp"
@@ -15,9 +16,12 @@
 namespace anchord::planning {
 namespace {
 
-std::string with_numbers(const char* format, double a, double b = 0) {
+/// Measuring points that differ less are as good as in one plane.
+constexpr double k_one_height_m = 0.5;
+
+std::string with_numbers(const char* format, double a, double b = 0, double c = 0) {
   std::array<char, 240> out{};
-  std::snprintf(out.data(), out.size(), format, a, b);
+  std::snprintf(out.data(), out.size(), format, a, b, c);
   return out.data();
 }
 
@@ -77,23 +81,26 @@ std::vector<Eigen::Vector3d> anchors_inside(const LocalPlan& plan, const FlightP
 
 void predict(const Plan& plan, const LocalPlan& local, PlanCheck& check) {
   const auto options = flight_options(plan);
+  std::vector<Eigen::Vector3d> measured;
+  for (std::size_t i = 0; i < local.waypoints_m.size(); ++i)
+    if (plan.waypoints[i].measure) measured.push_back(local.waypoints_m[i]);
   check.assumed_anchors_m = anchors_inside(local, options, plan.building_height_m);
+  // Of fewer than four points in all there is a warning of its own.
+  if (measured.size() >= 4)
+    check.n_out_of_range = std::erase_if(check.assumed_anchors_m, [&](const Eigen::Vector3d& anchor) {
+      return !in_range(anchor, measured, options.max_range_m);
+    });
   if (check.assumed_anchors_m.empty() || check.n_measure == 0) {
     check.assumed_anchors_m.clear();
     return;
   }
   Design design(check.assumed_anchors_m, options, {local.outline, plan.building_height_m, local.walls});
-  for (std::size_t i = 0; i < local.waypoints_m.size(); ++i) {
-    if (plan.waypoints[i].measure) design.add(local.waypoints_m[i]);
-  }
+  for (const auto& point : measured) design.add(point);
   check.predicted_sigma_m = design.sigmas_m();
   for (const auto& anchor : check.assumed_anchors_m) {
     Geometry<3> geometry(anchor);
-    for (std::size_t i = 0; i < local.waypoints_m.size(); ++i) {
-      if (plan.waypoints[i].measure && (local.waypoints_m[i] - anchor).norm() <= options.max_range_m) {
-        geometry.add(local.waypoints_m[i]);
-      }
-    }
+    for (const auto& point : measured)
+      if ((point - anchor).norm() <= options.max_range_m) geometry.add(point);
     const auto seen = geometry.gdop();
     check.predicted_gdop.push_back(seen ? std::optional(seen.value().root) : std::nullopt);
   }
@@ -124,6 +131,50 @@ std::string point_text(Refusal refusal, const Plan& plan, std::size_t i) {
   }
   if (refusal == Refusal::outside_fence) return who + "lies outside the fence";
   return who + with_numbers("is nearer than %.1f m to the building or a no-fly area", s.keep_out_m);
+}
+
+/// What is flown as drawn, and measures less than one would expect.
+void check_measuring_points(const Plan& plan, const LocalPlan& local, PlanCheck& check) {
+  const auto warn = [&](const char* code, std::string pointer, std::string text) {
+    check.issues.push_back({Severity::warning, code, std::move(pointer), std::move(text)});
+  };
+  double lowest_m = 1e9, highest_m = -1e9;
+  std::vector<std::size_t> near;
+  for (std::size_t i = 0; i < local.waypoints_m.size(); ++i) {
+    const auto& point = local.waypoints_m[i];
+    if (local.fence.size() >= 3 && contains(local.fence, point.head<2>()) &&
+        distance_to_edge_m(local.fence, point.head<2>()) < k_fence_margin_m - 0.01)
+      near.push_back(i);
+    if (!plan.waypoints[i].measure) continue;
+    lowest_m = std::min(lowest_m, point.z());
+    highest_m = std::max(highest_m, point.z());
+  }
+  if (!near.empty()) {
+    std::string which;
+    for (std::size_t k = 0; k < near.size() && k < 5; ++k)
+      which += (k == 0 ? "" : ", ") + std::to_string(near[k] + 1);
+    if (near.size() > 5) which += " and " + std::to_string(near.size() - 5) + " more";
+    warn("near_fence", "/waypoints/" + std::to_string(near.front()),
+         with_numbers(
+             "nearer than %.0f m to the fence, where a gust carries the aircraft over it, which ends the "
+             "flight: waypoint ",
+             k_fence_margin_m) +
+             which);
+  }
+  if (check.n_measure >= 4 && highest_m - lowest_m < k_one_height_m)
+    warn("one_height", "/waypoints",
+         with_numbers(
+             "all measuring points are between %.1f and %.1f m high: an anchor above them and its mirror "
+             "below fit alike. Measure at another height, too",
+             lowest_m, highest_m));
+  if (check.n_out_of_range > 0)
+    warn("over_range", "/outline",
+         with_numbers("%.0f of %.0f places inside the outline are within %.0f m of fewer than four measuring "
+                      "points: no "
+                      "anchor is located there",
+                      static_cast<double>(check.n_out_of_range),
+                      static_cast<double>(check.n_out_of_range + check.assumed_anchors_m.size()),
+                      flight_options(plan).max_range_m));
 }
 
 }  // namespace
@@ -215,6 +266,15 @@ Result<PlanCheck> check_plan(const Plan& plan) {
     report(Severity::warning, "no_outline", "/outline",
            "no outline is drawn: nothing keeps the aircraft away from the building");
   }
+  const auto check_ring = [&](const Polygon& ring, const std::string& pointer) {
+    if (crosses_itself(ring))
+      report(Severity::error, "self_crossing", pointer,
+             "it crosses itself: give its corners in order round it");
+  };
+  check_ring(local.outline, "/outline");
+  check_ring(local.fence, "/fence");
+  for (std::size_t i = 0; i < local.no_fly.size(); ++i)
+    check_ring(local.no_fly[i], "/no_fly/" + std::to_string(i));
   double furthest_m = 0;
   for (const auto& corner : local.outline) furthest_m = std::max(furthest_m, corner.norm());
   if (furthest_m > k_furthest_corner_m) {
@@ -255,10 +315,28 @@ Result<PlanCheck> check_plan(const Plan& plan) {
                         static_cast<double>(check.n_measure)));
   }
   predict(plan, local, check);
+  check_measuring_points(plan, local, check);
   return check;
 }
 
-Result<Plan> generate_waypoints(const Plan& plan) {
+Plan with_waypoints(Plan plan, const FlightPlan& flight, const Wgs84& origin) {
+  plan.waypoints.clear();
+  const EnuFrame frame(origin);
+  for (const auto& w : flight.waypoints) {
+    const auto at = frame.wgs84_from_enu(Enu{{w.point_m.x(), w.point_m.y(), 0}});
+    PlanWaypoint waypoint;
+    waypoint.at = {at.lon_deg, at.lat_deg};
+    waypoint.height_m = w.point_m.z();
+    waypoint.heading_deg = std::fmod(w.heading_rad * 180 / std::numbers::pi + 360, 360);
+    waypoint.measure = w.measure;
+    waypoint.turn = w.measure && plan.settings.turn;
+    waypoint.height_search = w.measure && plan.settings.height_search;
+    plan.waypoints.push_back(waypoint);
+  }
+  return plan;
+}
+
+Result<GeneratedPlan> generate_waypoints(const Plan& plan) {
   if (plan.outline.size() < 3) {
     return make_error(Errc::invalid_argument,
                       "waypoints are made from the building's outline, and the plan has none");
@@ -269,20 +347,12 @@ Result<Plan> generate_waypoints(const Plan& plan) {
   auto options = flight_options(plan);
   options.heights_m = heights_of(plan);
   BOOST_OUTCOME_TRY(const auto flight, plan_flight(input, options));
-  Plan out = plan;
-  out.waypoints.clear();
-  const EnuFrame frame(local.origin);
-  for (const auto& w : flight.waypoints) {
-    const auto at = frame.wgs84_from_enu(Enu{{w.point_m.x(), w.point_m.y(), 0}});
-    PlanWaypoint waypoint;
-    waypoint.at = {at.lon_deg, at.lat_deg};
-    waypoint.height_m = w.point_m.z();
-    waypoint.heading_deg = std::fmod(w.heading_rad * 180 / std::numbers::pi + 360, 360);
-    waypoint.measure = w.measure;
-    waypoint.turn = w.measure && plan.settings.turn;
-    waypoint.height_search = w.measure && plan.settings.height_search;
-    out.waypoints.push_back(waypoint);
-  }
+  GeneratedPlan out{with_waypoints(plan, flight, local.origin), {}};
+  BOOST_OUTCOME_TRY(auto check, check_plan(out.plan));
+  out.check = std::move(check);
+  if (flight.n_unreachable > 0)
+    out.check.issues.push_back(
+        {Severity::warning, "unreachable", "/outline", left_out_text(flight.n_unreachable)});
   return out;
 }
 

@@ -52,8 +52,10 @@ struct PlanCheck {
   double length_m{};
   FlightTime time;
   std::size_t n_measure{};
-  /// Of anchors assumed 5 m apart inside the outline; empty without outline or measuring points.
+  /// Of anchors assumed 5 m apart inside the outline, as far as four measuring points are in range; empty
+  /// without outline or measuring points.
   std::vector<Eigen::Vector3d> assumed_anchors_m;
+  std::size_t n_out_of_range{};  ///< the others
   std::vector<double> predicted_sigma_m;
   /// Of the measuring points within reach, seen from each assumed anchor; root of the trace. Absent: fewer
   /// than three, or all in one plane with it.
@@ -67,8 +69,15 @@ struct PlanCheck {
 /// errors  invalid_argument as plan_origin()
 Result<PlanCheck> check_plan(const Plan& plan);
 
-/// The plan with its waypoints replaced by those of plan_flight().
+/// The plan with its waypoints replaced by those of a flight that was planned in metres round `origin`.
+Plan with_waypoints(Plan plan, const FlightPlan& flight, const Wgs84& origin);
+
+struct GeneratedPlan {
+  Plan plan;
+  PlanCheck check;  ///< of it; places that no permitted path leads to are among its issues
+};
+/// The plan with its waypoints replaced by those of plan_flight(), and a look at it.
 /// errors  as plan_flight(), and invalid_argument without an outline
-Result<Plan> generate_waypoints(const Plan& plan);
+Result<GeneratedPlan> generate_waypoints(const Plan& plan);
 
 }  // namespace anchord::planning

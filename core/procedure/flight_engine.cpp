@@ -58,6 +58,7 @@ Result<FlightSetup> flight_setup(const Plan& plan, const Eigen::Vector3d& home_m
   out.limits.home_m = home_m;
   out.limits.speed_mps = s.speed_mps;
   out.limits.min_battery = s.min_battery;
+  out.limits.battery_per_s = 1 / s.endurance_s;
   out.exit.min_iterations = s.min_iterations;
   out.exit.max_iterations = s.max_iterations;
   out.exit.target_sigma_m = s.target_sigma_m;

@@ -19,7 +19,7 @@ struct SafetyLimits {
   double max_jump_m = 200;   ///< no target further than this from where the aircraft is
   double tolerance_m = 1.0;  ///< wind and control: a breach is beyond it
   double speed_mps = 2;
-  double battery_per_s = 1.0 / 1200;               ///< share used in flight: 20 minutes a battery
+  double battery_per_s = 1.0 / 1200;               ///< share used in flight
   double min_battery = 0.3;                        ///< must be left above home
   double critical_battery = 0.12;                  ///< lands where it is
   double position_age_s = 2;                       ///< older: it is not known where the aircraft is

@@ -79,9 +79,9 @@ struct PlanSettings {
   double min_height_m = 1.5, max_height_m = 30;
   double speed_mps = 2;
   double dwell_s = 4;
-  int samples = 20;                        ///< ranges wanted of each anchor at a point
-  int k = 3;                               ///< steps towards the next waypoint where nothing is heard, eq 8.6
-  bool turn = true, height_search = true;  ///< for anchors heard first, where the waypoint allows it
+  int samples = 20;  ///< ranges wanted of each anchor at a point
+  int k = 3;         ///< steps towards the next waypoint where no anchor is in range, eq 8.6
+  bool turn = true, height_search = true;  ///< for anchors ranged first, where the waypoint allows it
   double grid_step_m = 3, grid_step_up_m = 2;
   int grid_reach = 2, grid_reach_up = 1;
   planning::Rule rule = planning::Rule::a_optimal;
@@ -90,7 +90,8 @@ struct PlanSettings {
   double target_sigma_m = 0.05;
   std::optional<double> target_gdop{};  ///< conventional: the root
   std::optional<double> max_flight_s{};
-  double min_battery = 0.3;  ///< share at which the aircraft goes home
+  double min_battery = 0.3;   ///< share at which the aircraft goes home
+  double endurance_s = 1200;  ///< of the aircraft on a full battery
 };
 
 /// What the operator wants flown: outline, areas, waypoints, settings. `version` is its revision.

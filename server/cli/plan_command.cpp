@@ -81,7 +81,7 @@ std::optional<api::OutlineRequest> outline_of_kml(const std::string& text,
 }
 
 /// Any plan file we read, said as one we write.
-int plan_import(const std::string& path, const std::string& format) {
+int plan_import(const std::string& path, const std::string& format, api::Autopilot autopilot) {
   const auto text = read_all(path);
   if (!text) return 2;
   std::vector<api::FieldError> errors;
@@ -92,7 +92,7 @@ int plan_import(const std::string& path, const std::string& format) {
     print_errors(path, errors);
     return 2;
   }
-  const auto out = format == "plan" ? api::plan_qgc(plan) : api::plan_geojson(plan);
+  const auto out = format == "plan" ? api::plan_qgc(plan, autopilot) : api::plan_geojson(plan);
   if (!out) {
     std::fprintf(stderr, "anchord plan: %s: %s\n", path.c_str(), printable(out.error().message).c_str());
     return 2;
@@ -101,9 +101,17 @@ int plan_import(const std::string& path, const std::string& format) {
   return 0;
 }
 
+void add_autopilot(CLI::App& command, api::Autopilot& autopilot) {
+  add_word(
+      command, "--autopilot", autopilot, api::k_autopilot_words,
+      "whose mission items a .plan has: px4 takes headings from the waypoints and no turns, ardupilot needs "
+      "changes of yaw");
+}
+
 void add_import(CLI::App& plan, int& exit_code) {
   struct Import {
     std::string file, format{"geojson"};
+    api::Autopilot autopilot{};
   };
   auto import = std::make_shared<Import>();
   auto* command = plan.add_subcommand(
@@ -112,11 +120,14 @@ void add_import(CLI::App& plan, int& exit_code) {
   command->add_option("--format", import->format, "geojson, or plan (QGroundControl)")
       ->check(CLI::IsMember({"geojson", "plan"}))
       ->capture_default_str();
-  command->callback([import, &exit_code] { exit_code = plan_import(import->file, import->format); });
+  add_autopilot(*command, import->autopilot);
+  command->callback(
+      [import, &exit_code] { exit_code = plan_import(import->file, import->format, import->autopilot); });
 }
 
 struct Flight {
   std::string outline, format{"json"};
+  api::Autopilot autopilot{};
   double building_height_m{0};
   planning::FlightPlanOptions options;
 };
@@ -145,7 +156,9 @@ int plan_flight(const Flight& flight) {
   }
   std::string out;
   if (flight.format == "plan")
-    out = api::flight_plan_qgc(plan.value(), request->origin, request->input.outline, options);
+    out = api::plan_qgc(api::flight_as_plan(plan.value(), request->input, request->origin, options),
+                        flight.autopilot)
+              .value();
   else if (flight.format == "geojson")
     out = api::flight_plan_geojson(plan.value(), request->origin);
   else
@@ -165,6 +178,7 @@ void add_flight(CLI::App& plan, int& exit_code) {
       ->required();
   command->add_option("--format", flight->format, "json, plan (QGroundControl) or geojson")
       ->check(CLI::IsMember({"json", "plan", "geojson"}));
+  add_autopilot(*command, flight->autopilot);
   add_word(*command, "--rule,--criterion", o.rule, planning::k_rule_words,
            "a_optimal: mean error; d_optimal: error volume; dissertation chooses single points and cannot be "
            "used here");

@@ -97,7 +97,8 @@ Result<Plan> plan_from_outline(const sim::World& world) {
   plan.settings.samples = 2;
   plan.settings.max_flight_s = 1500;
   plan.settings.min_battery = 0.15;
-  return planning::generate_waypoints(plan);
+  BOOST_OUTCOME_TRY(auto made, planning::generate_waypoints(plan));
+  return std::move(made.plan);
 }
 
 sim::World walled_world() {

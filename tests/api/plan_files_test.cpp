@@ -138,6 +138,51 @@ TEST_F(PlanFiles, KeepEveryFenceOfAQGroundControlPlan) {
       HasSubstr("draw it in geoFence"));
 }
 
+// Items of an ArduPilot survey: MAV_CMD 178 speed, 16 waypoint, 93 delay, 115 yaw, 82 spline, 19 loiter, 17
+// loiter without end.
+TEST_F(PlanFiles, TakeSpeedHeadingsAndTimesOfAQGroundControlPlanAndSayWhatIsLeftOut) {
+  const auto item = [](int command, const std::string& params) {
+    return R"({"type":"SimpleItem","frame":3,"command":)" + std::to_string(command) + R"(,"params":[)" +
+           params + "]}";
+  };
+  const auto plan =
+      taken(R"({"fileType":"Plan","version":1,"geoFence":{},"mission":{"hoverSpeed":5,"items":[)" +
+            item(178, "1,3,-1,0,0,0,0") + ',' + item(16, "0,0,0,null,51.02,3.71,10") + ',' +
+            item(115, "90,0,0,0,0,0,0") + ',' + item(93, "7,-1,-1,-1,0,0,0") + ',' +
+            item(82, "0,0,0,null,51.03,3.71,10") + ',' + item(19, "5,0,0,null,51.03,3.72,12") + ',' +
+            item(17, "0,0,0,null,51.04,3.72,12") + ',' + item(178, "1,8,-1,0,0,0,0") + "]}}");
+  EXPECT_EQ(plan["settings"]["speed_mps"], 3);
+  ASSERT_EQ(plan["waypoints"].size(), 3u);
+  EXPECT_EQ(plan["waypoints"][0]["heading_deg"], 90);
+  EXPECT_EQ(plan["waypoints"][0]["dwell_s"], 7);
+  EXPECT_EQ(plan["waypoints"][0]["measure"], true);
+  EXPECT_EQ(plan["waypoints"][0]["turn"], false);
+  EXPECT_EQ(plan["waypoints"][2]["dwell_s"], 5);
+  ASSERT_EQ(plan["notes"].size(), 3u) << plan["notes"];
+  EXPECT_THAT(plan["notes"][0], HasSubstr("straight line"));
+  EXPECT_THAT(plan["notes"][1], AllOf(HasSubstr("/mission/items/6"), HasSubstr("its place is not flown to")));
+  EXPECT_THAT(plan["notes"][2], HasSubstr("one speed"));
+}
+
+TEST_F(PlanFiles, ComeBackFromAnArduPilotExportAsTheyWereAndHaveNoYawItemsForPx4) {
+  const auto made =
+      json(post("/api/v1/plans", R"({"name":"Round trip","settings":{"speed_mps":1.5},"waypoints":[
+      {"lon":3.7129,"lat":51.0229,"height_above_ground_m":5,"heading_deg":40,"dwell_s":6,"turn":true},
+      {"lon":3.7139,"lat":51.0229,"height_above_ground_m":6,"measure":false}]})"));
+  ASSERT_TRUE(made.contains("id")) << made;
+  const auto path = "/api/v1/plans/" + made["id"].get<std::string>() + "/export";
+  const auto again = taken(get(path).body);
+  EXPECT_EQ(again["notes"].size(), 0u) << again["notes"];
+  EXPECT_EQ(again["settings"]["speed_mps"], 1.5);
+  ASSERT_EQ(again["waypoints"].size(), 2u);
+  for (const auto* key : {"heading_deg", "dwell_s", "turn", "measure", "height_above_ground_m"})
+    for (int i : {0, 1}) EXPECT_EQ(again["waypoints"][i][key], made["waypoints"][i][key]) << i << key;
+  const auto px4 = Json::parse(get(path, {{"autopilot", "px4"}}).body);
+  EXPECT_EQ(px4["mission"]["firmwareType"], 12);  // MAV_AUTOPILOT_PX4
+  for (const auto& item : px4["mission"]["items"]) EXPECT_NE(item["command"], 115);
+  EXPECT_EQ(get(path, {{"autopilot", "dji"}}).status, 422);
+}
+
 TEST_F(PlanFiles, LoseNoFenceOfKml) {
   const auto kml = [](const std::string& inside) {
     return "<kml><Placemark>" + inside + "</Placemark></kml>";

@@ -168,6 +168,50 @@ TEST_F(Plans, WithACornerOnAnotherContinentIsJudgedAtOnceAndNotFlyable) {
   EXPECT_THAT((*far)["text"].get<std::string>(), ::testing::HasSubstr("limit is 2000 m"));
 }
 
+TEST_F(Plans, AreWarnedOfWaypointsAtTheFenceOfOneHeightAndOfPlacesOutOfRange) {
+  const auto codes = [&](const Json& plan) {
+    std::map<std::string, std::string> out;
+    const auto check = json(post("/api/v1/plans/validate", plan.dump()));
+    for (const auto& i : check["issues"]) out[i["code"]] = i["text"];
+    return out;
+  };
+  Json plan = hall();
+  plan["fence"] = Json::parse(
+      R"({"type":"Polygon","coordinates":[[[3.712,51.02301],[3.715,51.02301],[3.715,51.0242],[3.712,51.0242]]]})");
+  EXPECT_EQ(codes(plan).count("near_fence"), 0u);  // 4.4 m inside: 0.00004 degrees of latitude
+  plan["fence"]["coordinates"][0][0][1] = plan["fence"]["coordinates"][0][1][1] = 51.023045;  // 0.56 m
+  EXPECT_THAT(codes(plan)["near_fence"], ::testing::HasSubstr("waypoint 1, 2"));
+  EXPECT_EQ(codes(plan).count("one_height"), 0u);
+  for (auto& w : plan["waypoints"]) w["height_above_ground_m"] = 4;
+  plan["waypoints"][3]["measure"] = true;
+  EXPECT_EQ(codes(plan).count("one_height"), 1u);
+  EXPECT_EQ(codes(plan).count("over_range"), 0u);
+  // 300 m long: its east end is out of the 60 m of a tag from all four.
+  for (int i : {1, 2}) plan["outline"]["coordinates"][0][static_cast<std::size_t>(i)][0] = 3.7174;
+  plan["waypoints"].erase(1);
+  plan["waypoints"].erase(1);
+  for (int i : {0, 1}) {
+    plan["waypoints"].push_back(plan["waypoints"][static_cast<std::size_t>(i)]);
+    plan["waypoints"].back()["height_above_ground_m"] = 8;
+  }
+  EXPECT_EQ(codes(plan).count("over_range"), 1u);
+  const auto predicted = json(post("/api/v1/plans/validate", plan.dump()))["predicted"];
+  EXPECT_GT(predicted["n_out_of_range"], 0);
+  EXPECT_LT(predicted["worst_m"], 30) << "a place that is not measured is not a bad estimate";
+}
+
+TEST_F(Plans, WhoseOutlineCrossesItselfAreNotFlownAndHaveNoWaypointsMade) {
+  Json plan = hall();
+  std::swap(plan["outline"]["coordinates"][0][1], plan["outline"]["coordinates"][0][2]);
+  const auto check = json(post("/api/v1/plans/validate", plan.dump()));
+  EXPECT_EQ(check["flyable"], false);
+  EXPECT_EQ(check["issues"][1]["code"], "self_crossing") << check["issues"];
+  EXPECT_EQ(check["issues"][1]["pointer"], "/outline");
+  const auto made = post("/api/v1/plans/generate", plan.dump());
+  EXPECT_EQ(made.status, 422);
+  EXPECT_THAT(made.body, ::testing::HasSubstr("crosses itself"));
+}
+
 TEST_F(Plans, GenerateFliesRoundTheOutlineWithoutAnyWaypointSet) {
   Json plan = hall();
   plan.erase("waypoints");

@@ -13,6 +13,7 @@
 #include "api/calibration/calibration_service.hpp"
 #include "api/calibration/datum_change.hpp"
 #include "api/exchange/anchor_drawing.hpp"
+#include "api/formats/plan_export.hpp"
 #include "api/kit/contract.hpp"
 #include "api/kit/message.hpp"
 #include "api/learning/freeze_rows.hpp"
@@ -268,6 +269,7 @@ TEST(WireWords, AreThoseOfOpenApi) {
       {"ProcedureLogEntry.topic", procedure_topic_names()},
       {"ExclusionRequest.kind", words(k_row_kind_words)},
       {"FixClass", words(k_fix_words)},
+      {"GET /api/v1/plans/{id}/export ?autopilot", words(k_autopilot_words)},
       {"GET /api/v1/ranges ?fix", words(k_fix_words)},
       {"ConfiguredDevice.rover.fix", words(k_fix_words)},
       {"Verdict", words(k_verdict_words)},

@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "api/formats/flight_plan_output.hpp"
+#include "api/formats/plan_export.hpp"
 #include "tests/paths.hpp"
 
 namespace anchord::api::outline_geojson_test {
@@ -117,20 +118,24 @@ TEST(FlightPlanOutput, WritesAPlanThatQGroundControlReads) {
   ASSERT_TRUE(request);
   const planning::FlightPlanOptions options;
   const auto plan = planning::plan_flight(request->input, options).value();
-  const auto qgc =
-      nlohmann::json::parse(flight_plan_qgc(plan, request->origin, request->input.outline, options));
+  const auto qgc = nlohmann::json::parse(
+      plan_qgc(flight_as_plan(plan, request->input, request->origin, options), Autopilot::px4).value());
   EXPECT_EQ(qgc["fileType"], "Plan");
   const auto& items = qgc["mission"]["items"];
-  ASSERT_EQ(items.size(), plan.waypoints.size() + 2);
+  ASSERT_EQ(items.size(), plan.waypoints.size() + 3);
   EXPECT_EQ(items.front()["command"], 22);
+  EXPECT_EQ(items[1]["command"], 178);  // ground speed, before the first leg
+  EXPECT_EQ(items[1]["params"][1], options.speed_mps);
   EXPECT_EQ(items.back()["command"], 20);
   for (std::size_t i = 0; i < items.size(); ++i) {
     EXPECT_EQ(items[i]["doJumpId"], i + 1);
     EXPECT_EQ(items[i]["params"].size(), 7U);
   }
-  EXPECT_NEAR(items[1]["params"][4].get<double>(), 51.0228, 0.001);  // latitude first here
-  EXPECT_NEAR(items[1]["params"][5].get<double>(), 3.7102, 0.001);
+  EXPECT_NEAR(items[2]["params"][4].get<double>(), 51.0228, 0.001);  // latitude first here
+  EXPECT_NEAR(items[2]["params"][5].get<double>(), 3.7102, 0.001);
+  ASSERT_EQ(qgc["geoFence"]["polygons"].size(), 2U);  // the outline, and the example's no-fly area
   EXPECT_EQ(qgc["geoFence"]["polygons"][0]["inclusion"], false);
+  EXPECT_EQ(qgc["geoFence"]["polygons"][1]["inclusion"], false);
 
   const auto json = nlohmann::json::parse(flight_plan_json(plan, request->origin));
   EXPECT_EQ(json["waypoints"].size(), plan.waypoints.size());

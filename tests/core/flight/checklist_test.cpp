@@ -56,6 +56,32 @@ TEST(Checklist, RangesOfATagThatTheMissionDoesNotHaveAreNotGreenAndNameBoth) {
             "ranges come from tag 0x6e02, which the mission does not have (0x6e01): they are not used");
 }
 
+// 600 s of flight with 30 % on top are 780 s: 65 % of 20 minutes, 32.5 % of 40, and 30 % is the reserve.
+TEST(Checklist, TheBatteryThatAFlightNeedsFollowsTheEnduranceOfTheAircraft) {
+  planning::PlanCheck check;
+  check.time.expected_s = 600;
+  auto d = hears();
+  d.battery = 0.7;
+  d.battery_age_s = 0.1;
+  ChecklistFacts facts;
+  facts.plan = &check;
+  facts.drone = d;
+  const auto battery = [&] {
+    const auto list = make_checklist(facts);
+    return *std::find_if(list.begin(), list.end(), [](const auto& i) { return i.id == "battery"; });
+  };
+  EXPECT_FALSE(battery().green());
+  EXPECT_EQ(battery().detail, "70 % left, 95 % needed (a full one is taken to last 20 min)");
+  facts.endurance_s = 2400;
+  EXPECT_TRUE(battery().green());
+  EXPECT_NE(battery().detail.find("needed (a full one is taken to last 40 min)"), std::string::npos)
+      << battery().detail;
+  check.time.expected_s = 2400;
+  facts.drone->battery = 1;
+  EXPECT_FALSE(battery().green());
+  EXPECT_NE(battery().detail.find("divide the plan"), std::string::npos) << battery().detail;
+}
+
 TEST(Checklist, NamesAGroundStationThatSendsAsThisOneDoes) {
   const auto stations = [](const DroneStatus& d) {
     ChecklistFacts facts;

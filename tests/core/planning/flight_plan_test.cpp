@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/LU>
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -92,6 +93,28 @@ TEST(FlightPlan, StaysInsideTheFenceAndOutOfNoFly) {
     EXPECT_TRUE(contains(input.fence, w.point_m.head<2>()));
     EXPECT_GE(distance_to_edge_m(input.no_fly[0], w.point_m.head<2>()), 3.8 - 1e-6);
   }
+}
+
+// A block of 60 x 60 m round a court of 30 x 30 m, with a gate of 6 m: too narrow at 4 m of clearance.
+TEST(FlightPlan, IsFlownRoundTheBlockAndNotInACourtThatNoPermittedPathLeadsTo) {
+  const Polygon block{{0, 0},   {27, 0},  {27, 15}, {15, 15}, {15, 45}, {45, 45},
+                      {45, 15}, {33, 15}, {33, 0},  {60, 0},  {60, 60}, {0, 60}};
+  const auto inside = [](const Vector3d& p) { return p.x() > 0 && p.x() < 60 && p.y() > 0 && p.y() < 60; };
+  const auto plan = plan_flight({block, 6, {}, {}}, {}).value();
+  EXPECT_GT(plan.n_unreachable, 0U);
+  EXPECT_NE(plan.reason.find("no permitted path"), std::string::npos) << plan.reason;
+  for (const auto& w : plan.waypoints) EXPECT_FALSE(inside(w.point_m));
+  // A gate that is wide enough: the court is measured from, too.
+  Polygon wide = block;
+  wide[1].x() = wide[2].x() = 22;
+  wide[7].x() = wide[8].x() = 38;
+  const auto both = plan_flight({wide, 6, {}, {}}, {}).value();
+  EXPECT_EQ(both.n_unreachable, 0U);
+  EXPECT_TRUE(std::ranges::any_of(both.waypoints, [&](const auto& w) { return inside(w.point_m); }));
+  // A fence that leaves the court alone: it is what is flown.
+  const Polygon court{{15, 15}, {45, 15}, {45, 45}, {15, 45}};
+  const auto within = plan_flight({block, 6, {}, court}, {}).value();
+  for (const auto& w : within.waypoints) EXPECT_TRUE(inside(w.point_m));
 }
 
 TEST(FlightPlan, NamesWhatMakesItImpossible) {

@@ -252,7 +252,7 @@ TEST(GenerateWaypoints, KeepsOutOfAnAcceptedBuildingThatIsLargerThanTheDrawnOne)
   const double middle_deg = (accepted[0].lon_deg + accepted[1].lon_deg) / 2;
   plan.outline = {
       accepted[0], {middle_deg, accepted[1].lat_deg}, {middle_deg, accepted[2].lat_deg}, accepted[3]};
-  const auto made = generate_waypoints(plan).value();
+  const auto made = generate_waypoints(plan).value().plan;
   const auto local = local_plan(made).value();
   ASSERT_GE(local.waypoints_m.size(), 8u);
   for (const auto& w : local.waypoints_m) {
