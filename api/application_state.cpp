@@ -54,6 +54,7 @@ Application::State::State(Deps d)
            .device_rows = [this] { return device_rows(); },
            .predict = [this](const Range& range) { return predict_range(*models.active(), range); },
            .predict_needs_cir = [this] { return models.active()->needs_cir; },
+           .models_promoted = [this] { return !models.active()->predictor.empty(); },
            .site_outline = deps.site_outline,
            .track = deps.track,
            .kept_priors = [this](const MissionId& id) { return kept_outcome(stores.plans, id).priors; },

@@ -10,6 +10,8 @@ namespace {
 // dashboard.md section 6
 constexpr double k_lost_s = 2, k_float_s = 5, k_silent_ranges_s = 5, k_old_corrections_s = 10;
 constexpr double k_skew_s = 0.05;
+constexpr double k_ahead_s =
+    1;  ///< nothing arrives before it was measured; 1 s for clocks that NTP has yet to set
 // A receiver may take so long to its first fix after it was switched on with the tag.
 constexpr double k_never_s = 20;
 // reliability.md section 2: warn at 2 GiB free, refuse new flights at 500 MiB
@@ -72,6 +74,15 @@ void tags(const FlightPulse& f, std::vector<AlarmCondition>& out) {
 }
 
 void clock(const FlightPulse& f, std::vector<AlarmCondition>& out) {
+  if (f.ahead_s && *f.ahead_s > k_ahead_s) {
+    out.push_back(
+        {"clock.skew", AlarmPriority::warning,
+         f.name +
+             ": ranges are stamped later than they arrive, by more than 1 s: set the clock of the computer "
+             "that stamps them (NTP), or this one's",
+         f.mission});
+    return;
+  }
   if (!f.lag_s || std::abs(*f.lag_s) - 2 * f.lag_sigma_s.value_or(0) <= k_skew_s) return;
   char text[96];
   std::snprintf(text, sizeof text, ": the clocks of tag and rover differ by %.1f s", *f.lag_s);

@@ -6,6 +6,7 @@
 
 #include "api/anchors/published_features.hpp"
 #include "api/anchors/routes.hpp"
+#include "api/kit/query_site.hpp"
 #include "api/kit/reader.hpp"
 #include "api/kit/support.hpp"
 #include "api/missions/mission_service.hpp"
@@ -78,9 +79,9 @@ std::vector<AnchorFeature> selected_anchors(AnchorApi& s, const Request& request
                   {{"/view", "unknown_value", "must be published or live"}});
   auto all = view == "live" ? live(s, query_mission(request)) : published_features(s, revision, number);
   const auto box = query_box(request);
-  const auto site = request.query_value("site");
+  const auto site = query_site(s.sites, request);
   std::erase_if(all, [&](const AnchorFeature& feature) {
-    if (site && (!feature.anchor.site || to_string(*feature.anchor.site) != *site)) return true;
+    if (site && feature.anchor.site != site) return true;
     if (!box) return false;
     if (!feature.estimate || !feature.estimate->best || !feature.estimate->best->wgs84) return true;
     return !box->holds(*feature.estimate->best->wgs84);

@@ -87,15 +87,19 @@ std::optional<UtcTime> instant(std::string_view text) {
   return time.value();
 }
 
+/// Times are written in whole microseconds: what is named so is found by its own name.
+UtcTime end_of_us(UtcTime time) { return UtcTime{(time.ns / 1000) * 1000 + 999}; }
+
 OgcInterval interval_of(const std::string& text) {
   const auto slash = text.find('/');
   if (slash == std::string::npos) {
     const auto at = instant(text);
     if (!at) bad("datetime", "must be an RFC 3339 time, or two with / between them; .. is an open end");
-    return {at, at};
+    return {at, end_of_us(*at)};
   }
   OgcInterval out{instant(std::string_view(text).substr(0, slash)),
                   instant(std::string_view(text).substr(slash + 1))};
+  if (out.to) out.to = end_of_us(*out.to);
   if (out.from && out.to && *out.from > *out.to) bad("datetime", "ends before it begins");
   return out;
 }

@@ -306,7 +306,7 @@ class Importer {
       range_column = where->first;
       const auto found = value({where->first}, 0,
                                has_unit(where->first) ? k_furthest_m / metres : row_limits::k_distance_m.max);
-      return found ? std::optional{*found * metres} : std::nullopt;
+      return found ? std::optional{in_metres(*found, where->first)} : std::nullopt;
     };
     const auto has_name = [&row](auto name) { return row.contains(name); };
     auto range_m = range(k_range);
@@ -366,7 +366,7 @@ class Importer {
       const auto* found = length ? telling_cell(row, names) : cell(row, names);
       if (!found || says_nothing(found->second)) return;
       auto parsed = number(found->second);
-      if (parsed && length) *parsed *= metres_per_unit(found->first).value_or(1);
+      if (parsed && length) *parsed = in_metres(*parsed, found->first);
       if (!parsed || *parsed < low || *parsed > high)
         return fault.set(k_impossible, found->first,
                          spelled(found->first) + " impossible: " + in_quotes(found->second));

@@ -101,6 +101,12 @@ std::optional<double> metres_per_unit(std::string_view name) {
   return plain.ends_with("mm") ? 1e-3 : plain.ends_with("cm") ? 1e-2 : 1.0;
 }
 
+double in_metres(double length, std::string_view name) {
+  // Divided: a thousandth is no binary number, and 5100 times it is not 5.1.
+  const double metres = metres_per_unit(name).value_or(1);
+  return metres < 1 ? length / std::round(1 / metres) : length;
+}
+
 std::vector<std::string> in_runs(std::span<const std::string> names) {
   std::vector<std::string> out;
   for (std::size_t i = 0; i < names.size();) {

@@ -94,6 +94,8 @@ std::optional<std::size_t> first_of(std::span<const std::string> header, const N
 /// Metres of one unit of a column, by the end of its name; nothing where that is a unit of something else
 /// ("range_ft", "tof_ns"). A name without a unit is metres.
 std::optional<double> metres_per_unit(std::string_view name);
+/// A length in the unit of its column, in metres: 5100 of "range_mm" is the number that 5.1 of "range_m" is.
+double in_metres(double length, std::string_view name);
 
 /// "CIR0 to CIR1015 (1016 columns)": numbered columns that follow one another are one entry.
 std::vector<std::string> in_runs(std::span<const std::string> names);

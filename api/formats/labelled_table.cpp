@@ -425,15 +425,14 @@ class TableReader {
       return at == k_no_column ? std::nullopt : finite(values_[at]);
     };
     // A set without ranges can still tell classes by levels.
-    const double range =
-        range_ == k_no_column ? 0 : values_[range_] * metres_per_unit(header_.names[range_]).value_or(1);
+    const double range = range_ == k_no_column ? 0 : in_metres(values_[range_], header_.names[range_]);
     if (range_ != k_no_column && !(range > 0))
       return drop(header_.names[range_] + (std::isnan(range) ? lacks(cells[range_]) : " not above zero"),
                   line);
     // A class needs no true range: whoever asks for a bias leaves rows without one out.
     std::optional<double> truth;
     if (truth_ != k_no_column && !says_nothing(cells[truth_])) {
-      truth = finite(values_[truth_] * metres_per_unit(header_.names[truth_]).value_or(1));
+      truth = finite(in_metres(values_[truth_], header_.names[truth_]));
       if (truth) ratios_.add(range, *truth);
       if (!truth) return drop(header_.names[truth_] + " is no number", line);
       if (!(*truth > 0) || *truth > 1e4) return drop(header_.names[truth_] + " impossible", line);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <compare>
 #include <nlohmann/json.hpp>
 #include <set>
 
@@ -227,6 +228,69 @@ void refuse_query_word(const char* name, std::span<const std::string_view> words
                 {{std::string("/") + name, "unknown_value", "must be one of " + list_of(words)}});
 }
 
+namespace {
+
+/// What Accept names: `text/csv;q=0.5` (RFC 9110, 12.5.1), in small letters.
+struct MediaRange {
+  std::string type;
+  double quality{1};
+};
+
+std::vector<MediaRange> media_ranges(std::string_view accept) {
+  std::vector<MediaRange> out;
+  constexpr std::size_t k_most = 50;
+  while (!accept.empty() && out.size() < k_most) {
+    const auto comma = std::min(accept.find(','), accept.size());
+    std::string one;
+    for (const char c : accept.substr(0, comma))
+      if (c != ' ' && c != '\t') one += c >= 'A' && c <= 'Z' ? static_cast<char>(c + 32) : c;
+    accept.remove_prefix(std::min(comma + 1, accept.size()));
+    MediaRange range{one.substr(0, one.find(';'))};
+    if (const auto q = one.find(";q="); q != std::string::npos) {
+      const auto [end, error] = std::from_chars(one.data() + q + 3, one.data() + one.size(), range.quality);
+      if (error != std::errc{} || !(range.quality >= 0 && range.quality <= 1)) range.quality = 0;
+    }
+    if (!range.type.empty()) out.push_back(std::move(range));
+  }
+  return out;
+}
+
+/// How much an offer is wanted: by quality, and of equal ones by how exactly it is named. Then it is ours to
+/// choose.
+struct Preference {
+  double quality{0};
+  int exactness{0};
+  auto operator<=>(const Preference&) const = default;
+};
+
+/// The most exact range decides, as RFC 9110 has it. `usual`: what is given where nothing is asked for; it is
+/// named by application/json too.
+Preference preference(const std::vector<MediaRange>& ranges, std::string_view offer, bool usual) {
+  static constexpr std::pair<std::string_view, std::string_view> k_types[]{
+      {"geojson", "application/geo+json"},
+      {"ndjson", "application/x-ndjson"},
+      {"csv", "text/csv"},
+      {"json", "application/json"},
+      {"binary", "application/octet-stream"},
+      {"kml", "application/vnd.google-earth.kml+xml"},
+      {"gpkg", "application/geopackage+sqlite3"}};
+  const auto known = std::ranges::find(k_types, offer, [](const auto& t) { return t.first; });
+  const std::string_view type = known == std::end(k_types) ? std::string_view{} : known->second;
+  Preference out;
+  for (const auto& range : ranges) {
+    const int exactness = !type.empty() && range.type == type         ? 4
+                          : usual && range.type == "application/json" ? 3
+                          : !type.empty() && range.type == std::string(type.substr(0, type.find('/'))) + "/*"
+                              ? 2
+                          : range.type == "*/*" ? 1
+                                                : 0;
+    if (exactness > out.exactness) out = {range.quality, exactness};
+  }
+  return out;
+}
+
+}  // namespace
+
 std::string negotiate(const Request& request, std::initializer_list<std::string_view> offers) {
   const auto offered = [&](std::string_view word) {
     return std::find(offers.begin(), offers.end(), word) != offers.end();
@@ -238,20 +302,19 @@ std::string negotiate(const Request& request, std::initializer_list<std::string_
                         list_of({offers.begin(), offers.end()}));
     return *format;
   }
-  const std::string accept(request.header("accept"));
-  if (accept.empty() || accept.find("*/*") != std::string::npos) return std::string(*offers.begin());
-  static constexpr std::pair<std::string_view, std::string_view> k_types[]{
-      {"application/geo+json", "geojson"},
-      {"application/x-ndjson", "ndjson"},
-      {"text/csv", "csv"},
-      {"application/json", "json"},
-      {"application/octet-stream", "binary"}};
-  for (const auto& [type, word] : k_types) {
-    if (accept.find(type) != std::string::npos && offered(word)) return std::string(word);
+  const auto accept = request.header("accept");
+  if (accept.empty()) return std::string(*offers.begin());
+  const auto ranges = media_ranges(accept);
+  std::string_view best;
+  Preference of_best{};
+  for (const auto offer : offers) {
+    const auto wanted = preference(ranges, offer, offer == *offers.begin());
+    if (wanted.quality > 0 && (best.empty() || wanted > of_best)) {
+      best = offer;
+      of_best = wanted;
+    }
   }
-  if (accept.find("application/json") != std::string::npos ||
-      accept.find("application/*") != std::string::npos)
-    return std::string(*offers.begin());
+  if (!best.empty()) return std::string(best);
   throw_problem(406, "not-acceptable",
                 "none of the formats in Accept is available here; ?format= takes " +
                     list_of({offers.begin(), offers.end()}));

@@ -139,13 +139,15 @@ Response import(LearningApi& l, const Request& request) {
   const bool dry_run = query_flag(request, "dry_run");
   auto read = read_campaign_rows(request);
   CampaignStore::Appended done;
-  if (!dry_run && !read.rows.empty()) {
+  if (dry_run && !read.rows.empty()) {
+    done = value_or_problem(l.stores.campaigns.would_append(campaign.id, read.rows, read.untimed));
+  } else if (!read.rows.empty()) {
     done = value_or_problem(l.stores.campaigns.append(campaign.id, read.rows, read.untimed));
     l.audit(request,
             "campaign.import " + to_string(campaign.id) + " " + std::to_string(done.accepted) + " samples");
   }
   Ordered report = Ordered::parse(read.report_json);
-  report["accepted"] = dry_run ? read.rows.size() : done.accepted;
+  report["accepted"] = done.accepted;
   report["duplicates"] = done.duplicates;
   // A place of this file may differ in capitals from one that is stored.
   std::vector<std::string> environments, settings;

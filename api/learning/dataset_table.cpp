@@ -268,7 +268,10 @@ struct Source {
   }
 };
 
-Result<std::vector<Source>> sources_of(const DatasetTable& table, const std::vector<std::string>& names) {
+/// Of no names, the features that flights can have and nearly every row has. `dropped`: which others there
+/// are, with the rows that lack them.
+Result<std::vector<Source>> sources_of(const DatasetTable& table, const std::vector<std::string>& names,
+                                       std::map<std::string, std::size_t>& dropped) {
   std::vector<Source> out;
   for (const auto& name : names) {
     const auto feature = nlos::feature_of(name);
@@ -285,6 +288,9 @@ Result<std::vector<Source>> sources_of(const DatasetTable& table, const std::vec
     const auto feature = static_cast<Feature>(f);
     if (present > 0 && 100 * present >= 99 * table.rows.size())
       out.push_back({std::string(nlos::feature_name(feature)), feature, 0});
+    else if (present > 0)
+      dropped[std::string(nlos::feature_name(feature)) + " is not used as a feature: rows without it"] =
+          table.rows.size() - present;
   }
   return out;
 }
@@ -314,7 +320,7 @@ LearningWish wish_of(ml::Task task, const DatasetTable& table) {
 
 Result<LearningRows> learning_rows(const DatasetTable& table, const LearningWish& wish) {
   LearningRows out;
-  BOOST_OUTCOME_TRY(const auto sources, sources_of(table, wish.features));
+  BOOST_OUTCOME_TRY(const auto sources, sources_of(table, wish.features, out.dropped));
   for (const auto& source : sources) out.data.features.push_back(source.name);
   // A place with rows on both sides of the split is two places, so that training never sees a test row.
   std::map<std::string, std::pair<bool, bool>> sides;

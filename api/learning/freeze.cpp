@@ -83,8 +83,16 @@ Result<void> add_rows_of_missions(const DatasetQuery& query, MeasurementStore& m
                                   MissionStore& missions, ExclusionStore& exclusions,
                                   std::vector<DatasetRow>& rows,
                                   std::map<std::string, std::size_t>& dropped) {
+  std::map<std::string, std::size_t> of_name;
   for (const auto& id : query.missions) {
     BOOST_OUTCOME_TRY(const auto mission, missions.mission(id));
+    ++of_name[mission.name];
+  }
+  for (const auto& id : query.missions) {
+    BOOST_OUTCOME_TRY(const auto mission, missions.mission(id));
+    // Two flights of one name are two places.
+    const std::string flight =
+        of_name[mission.name] > 1 ? mission.name + " (" + to_string(id) + ")" : mission.name;
     BOOST_OUTCOME_TRY(const auto out_of_use, exclusions.exclusions(id));
     MeasurementStore::Filter filter;
     filter.mission = id;
@@ -102,7 +110,7 @@ Result<void> add_rows_of_missions(const DatasetQuery& query, MeasurementStore& m
           continue;
         }
         // Each anchor of a flight is a setting of its own; the place is the flight.
-        rows.push_back({mission.name, mission.name, to_string(range.anchor), false, range.truth->los,
+        rows.push_back({flight, flight, to_string(range.anchor), false, range.truth->los,
                         range.truth->distance_m, 1, features_of(range), registers_of(range)});
         if (rows.size() > k_most_rows)
           return make_error(Errc::invalid_argument, "more than 500000 measurements: ask for fewer flights");

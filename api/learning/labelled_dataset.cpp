@@ -172,13 +172,19 @@ DatasetTable dataset_rows(const LabelledTable& table, const std::string& campaig
   return out;
 }
 
-std::vector<std::string> available_features(const LabelledTable& table, bool with_registers) {
+std::vector<std::string> available_features(const LabelledTable& table, bool with_registers,
+                                            std::map<std::string, std::size_t>& lacking) {
   std::vector<std::string> out;
   const auto most = static_cast<std::size_t>(0.99 * static_cast<double>(table.rows()));
   for (std::size_t f = 0; f < nlos::k_feature_count; ++f) {
     std::size_t present = 0;
     for (const auto& row : table.features) present += row.present.test(f) ? 1 : 0;
-    if (present >= most && present > 0) out.emplace_back(nlos::feature_name(static_cast<nlos::Feature>(f)));
+    if (present == 0) continue;
+    const std::string name(nlos::feature_name(static_cast<nlos::Feature>(f)));
+    if (present >= most)
+      out.push_back(name);
+    else
+      lacking[name] = table.rows() - present;
   }
   if (!with_registers) return out;
   for (const auto name : register_columns()) {

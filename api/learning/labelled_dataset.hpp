@@ -1,5 +1,7 @@
 #pragma once
 
+#include <cstddef>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -28,7 +30,8 @@ Result<ml::Dataset> dataset_from(const LabelledTable& table, const SetRequest& r
 DatasetTable dataset_rows(const LabelledTable& table, const std::string& campaign = {});
 
 /// Names every row (but at most 1 %) has: computed features, then the register columns that are features in
-/// their own right.
-std::vector<std::string> available_features(const LabelledTable& table, bool with_registers);
+/// their own right. `lacking`: what some have and more than that lack, with the rows without it.
+std::vector<std::string> available_features(const LabelledTable& table, bool with_registers,
+                                            std::map<std::string, std::size_t>& lacking);
 
 }  // namespace anchord::api

@@ -1,6 +1,8 @@
 #include "api/learning/learning_json.hpp"
 
 #include <nlohmann/json.hpp>
+#include <set>
+#include <string_view>
 
 #include "api/admin/job_json.hpp"
 #include "api/kit/or_null.hpp"
@@ -222,7 +224,9 @@ nlos::FeatureVector read_features(const Json& sample, const std::string& at,
                                   std::vector<FieldError>& errors) {
   Fields fields(sample, at, errors);
   nlos::DiagnosticSample s;
+  std::set<std::string_view> measured;
   const auto take = [&](const char* key, std::optional<double>& into, double low, double high) {
+    measured.insert(key);
     if (const auto value = fields.number(key, low, high)) into = *value;
   };
   take("range_m", s.range_m, 0.01, 1e4);
@@ -245,7 +249,9 @@ nlos::FeatureVector read_features(const Json& sample, const std::string& at,
   for (std::size_t f = 0; f < nlos::k_feature_count; ++f) {
     const auto feature = static_cast<nlos::Feature>(f);
     const std::string name(nlos::feature_name(feature));
-    if (!fields.has(name)) continue;
+    // What was measured is in the features already, as training has it: levels of registers where both are
+    // given.
+    if (!fields.has(name) || (measured.contains(name) && out.present.test(f))) continue;
     if (const auto value = fields.number(name, -1e9, 1e9)) out.set(feature, *value);
   }
   fields.finish();

@@ -15,7 +15,6 @@ void take_cir(const std::optional<Cir>& cir, bool whole_record, nlos::Diagnostic
   if (s.std_noise) options.noise_rms = *s.std_noise / std::sqrt(1 - std::numbers::pi / 4);
   s.cir = nlos::cir_shape(std::span<const std::int16_t>(cir->re_im), cir->first_path_idx, options);
   if (!s.preamble_count) s.preamble_count = cir->preamble_count;
-  if (!s.fp_index) s.fp_index = cir->first_path_idx;
 }
 
 }  // namespace

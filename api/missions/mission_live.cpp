@@ -18,6 +18,7 @@ flight::LiveRow MissionService::State::row_of(Range range) const {
   flight::PredictedRange row{std::move(range), {}, {}};
   row.time = row.range.time;
   row.model = deps.predict(row.range);
+  row.silent = !row.model && row.range.kind == RangeKind::tag_anchor && deps.models_promoted();
   row.range.cir.reset();  // a queued row needs none, and it is 4 kB
   return row;
 }

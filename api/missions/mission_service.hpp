@@ -68,6 +68,7 @@ class MissionService {
     /// What the promoted models say of a range; nothing while none is promoted.
     std::function<std::optional<RangeModel>(const Range&)> predict;
     std::function<bool()> predict_needs_cir;
+    std::function<bool()> models_promoted;
     bool site_outline{true};  ///< joint solutions take the site's outline as a prior: anchors are inside
     TrackLimits track{};      ///< what the positions of a flight are held against
     /// What turns and height searches of a mission's flight told, as kept with it.

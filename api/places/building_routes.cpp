@@ -1,6 +1,7 @@
 #include <nlohmann/json.hpp>
 
 #include "api/kit/id_page.hpp"
+#include "api/kit/query_site.hpp"
 #include "api/kit/reader.hpp"
 #include "api/kit/record_limits.hpp"
 #include "api/kit/support.hpp"
@@ -40,8 +41,7 @@ void read(const Json& body, Building& building, bool made) {
 
 Response list(PlaceApi& s, const Request& request) {
   check_query(request, {"limit", "cursor", "fields", "site"});
-  const auto text = request.query_value("site");
-  const auto site = cursor_id<SiteId>(text.value_or(""));
+  const auto site = query_site(s.sites, request);
   return id_page<BuildingId>(
       request,
       [&](std::size_t limit, const std::optional<BuildingId>& after) {

@@ -44,9 +44,12 @@ void LiveMission::add(const PredictedRange& judged) {
   const double span_s = static_cast<double>(range_times_us_.back() - range_times_us_.front()) * 1e-6;
   state_.range_rate_hz = span_s > 0 ? static_cast<double>(range_times_us_.size() - 1) / span_s : 0;
   if (!follows(range)) return;
-  watch_.note_range(range.time);
+  watch_.note_range(range.time, range.received);
   if (excluded(setup_.exclusions, range)) return live_.leave_out(range);
-  if (judged.model) watch_.note_model(judged.model->withheld);
+  if (judged.model)
+    watch_.note_model(judged.model->withheld);
+  else if (judged.silent)
+    watch_.note_model("ranges lack what they need (levels, or an impulse response)");
   history_.add(corrected(judged), error_model_of(judged));
   ++ranges_since_joint_;
   live_.add(range, judged.model);

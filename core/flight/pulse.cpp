@@ -1,5 +1,7 @@
 #include "core/flight/pulse.hpp"
 
+#include <algorithm>
+
 namespace anchord::flight {
 namespace {
 
@@ -7,6 +9,7 @@ constexpr std::size_t k_looks = 10;
 // One range in five of the newest fifty: single odd ones are what withholding is for.
 constexpr std::size_t k_judged = 50, k_many_withheld = 10;
 constexpr double k_unknown_tag_s = 10;
+constexpr std::size_t k_ahead_ranges = 20;
 // A wall moves no anchor by more, and no anchor so far that its own uncertainty could.
 constexpr double k_moved_m = 3, k_moved_regions = 3;
 
@@ -27,7 +30,11 @@ void FlightWatch::note(const Fix& fix) {
   since(pulse_.float_since, fix.fix == FixClass::rtk_float);
 }
 
-void FlightWatch::note_range(UtcTime measured) {
+void FlightWatch::note_range(UtcTime measured, std::optional<UtcTime> received) {
+  if (received) {
+    ahead_s_.push_back(seconds_between(*received, measured));
+    if (ahead_s_.size() > k_ahead_ranges) ahead_s_.pop_front();
+  }
   if (!pulse_.first_range) pulse_.first_range = measured;
   if (!pulse_.newest_range || *pulse_.newest_range < measured) pulse_.newest_range = measured;
 }
@@ -68,6 +75,9 @@ void FlightWatch::note_moved(NetworkId anchor, std::optional<double> moved_m, do
 }
 
 FlightPulse FlightWatch::look(UtcTime newest_measured, Steady now) {
+  // The least of some: one that waited on its way says nothing of the clock.
+  pulse_.ahead_s =
+      ahead_s_.size() == k_ahead_ranges ? std::optional(*std::ranges::min_element(ahead_s_)) : std::nullopt;
   pulse_.unknown_tags.clear();
   for (const auto& [tag, measured] : unknown_tags_)
     if (seconds_between(measured, newest_measured) < k_unknown_tag_s)

@@ -29,6 +29,8 @@ struct FlightPulse {
   std::optional<UtcTime> below_float_since{}, float_since{};  ///< measured; absent while it is better
   std::optional<double> correction_age_s{};                   ///< of the newest fix, where it says
   std::optional<double> lag_s{}, lag_sigma_s{};               ///< of the joint solution
+  std::optional<double>
+      ahead_s{};  ///< stamps of the newest ranges are at least this much later than their arrival
   std::string_view models_withheld{};  ///< why the models' corrections are not applied, while many are not
   std::string unknown_tags{};  ///< tags that range and that the mission does not have; empty: none lately
   std::string known_tags{};    ///< those it has
@@ -41,7 +43,7 @@ class FlightWatch {
  public:
   using Steady = std::chrono::steady_clock::time_point;
   void note(const Fix& fix);
-  void note_range(UtcTime measured);
+  void note_range(UtcTime measured, std::optional<UtcTime> received);
   /// Of a range whose tag the mission does not have: it is stored, and nothing is solved with it.
   void note_unknown_tag(NetworkId tag, UtcTime measured, const std::string& known_tags);
   void note_lag(double lag_s, double sigma_s);
@@ -58,6 +60,7 @@ class FlightWatch {
  private:
   FlightPulse pulse_;
   std::deque<std::pair<UtcTime, Steady>> looks_;
+  std::deque<double> ahead_s_;             ///< of the newest ranges: stamp minus arrival
   std::deque<std::string_view> withheld_;  ///< of the newest ranges that models judged
   std::set<NetworkId> moved_;
   std::map<NetworkId, UtcTime> unknown_tags_;  ///< newest range of each

@@ -19,6 +19,7 @@ struct PredictedRange {
   Range range;
   std::optional<RangeModel> model;
   UtcTime time{};
+  bool silent{false};  ///< models are promoted, and none of them has anything to say of it
 };
 /// What waits for a live flight.
 using LiveRow = std::variant<PredictedRange, Fix>;

@@ -211,7 +211,7 @@ void assess_mirrors(const FlightRows& flight, AnchorSolution& solution, const st
   const double apart_m = (mirror->fit.position_m - estimate.best->position.m).norm();
   estimate.reason =
       text("mirror: a solution %.2f m away fits as well (misfit %+.2f, %.2f m apart horizontally)", apart_m,
-           mirror->worse, mirror->horizontal_m);
+           std::round(100 * mirror->worse) / 100 + 0.0, mirror->horizontal_m);  // no "-0.00"
   if (!geometry.reason.empty()) estimate.reason += "; " + geometry.reason;
   // Until someone says which, the claimed height must hold both.
   estimate.v95_m = std::max(

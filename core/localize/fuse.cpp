@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
+#include <utility>
 
 #include "core/base/check.hpp"
 #include "core/localize/error_ellipse.hpp"
@@ -27,6 +29,39 @@ std::vector<Gate> worst_gates(std::span<const Estimate* const> estimates) {
     }
   }
   return worst;
+}
+
+/// The common answer against flights that leave open which of two places is the anchor's: of each its nearer
+/// place, horizontally. The flight that contradicts most; nothing where none is further off than both claim,
+/// twice over, for what an ambiguous flight claims is of one place alone.
+std::optional<Gate> contradicted(std::span<const Estimate> estimates, const Hypothesis& common,
+                                 double h95_m) {
+  std::optional<Gate> worst;
+  for (const Estimate& estimate : estimates) {
+    if (estimate.verdict != Verdict::ambiguous || !estimate.best) continue;
+    double nearest_chi2 = std::numeric_limits<double>::infinity(), apart_m = 0;
+    for (const auto* place : {&estimate.best, &estimate.mirror}) {
+      if (!*place) continue;
+      const Eigen::Vector2d off = ((*place)->position.m - common.position.m).head<2>();
+      const Eigen::Matrix2d both =
+          (*place)->covariance_m2.topLeftCorner<2, 2>() + common.covariance_m2.topLeftCorner<2, 2>();
+      const double chi2 = off.dot(both.inverse() * off);
+      if (!(chi2 < nearest_chi2)) continue;
+      nearest_chi2 = chi2;
+      apart_m = off.norm();
+    }
+    if (!std::isfinite(nearest_chi2) || apart_m <= 2 * (estimate.h95_m + h95_m)) continue;
+    Gate gate = ambiguous_flight_gate(nearest_chi2, apart_m);
+    if (!gate.passed && (!worst || *gate.value > *worst->value)) worst = std::move(gate);
+  }
+  return worst;
+}
+
+void contradict(Estimate& estimate, Gate gate) {
+  estimate.verdict = Verdict::diverged;
+  estimate.reason = "the flights contradict each other: " + gate.why;
+  std::erase_if(estimate.gates, [&](const Gate& known) { return known.name == gate.name; });
+  estimate.gates.push_back(std::move(gate));
 }
 
 }  // namespace
@@ -86,16 +121,17 @@ Estimate fuse_estimates(std::span<const Estimate> estimates) {
   out.verdict = Verdict::ok;
   out.reason.clear();
   if (dof > 0) {
-    const Gate agreement = flights_gate(chi2, n_ok);
-    if (!agreement.passed) {
-      out.verdict = Verdict::diverged;
-      out.reason = "the flights contradict each other: " + agreement.why;
-    }
-    out.gates.push_back(agreement);
+    Gate agreement = flights_gate(chi2, n_ok);
+    if (agreement.passed)
+      out.gates.push_back(std::move(agreement));
+    else
+      contradict(out, std::move(agreement));
   }
   const ErrorEllipse ellipse = error_ellipse(best.covariance_m2);
   out.h95_m = ellipse.h95_m;
   out.v95_m = ellipse.v95_m;
+  if (auto gate = contradicted(estimates, best, out.h95_m); gate && out.verdict == Verdict::ok)
+    contradict(out, std::move(*gate));
   return out;
 }
 

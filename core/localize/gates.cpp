@@ -281,6 +281,15 @@ Gate flights_gate(double chi2, std::size_t n_flights, const GateLimits& limits) 
                       n_flights, chi2, dof));
 }
 
+Gate ambiguous_flight_gate(double chi2, double apart_m, const GateLimits& limits) {
+  return at_most(
+      "flights", chi2, chi2_quantile(limits.probability, 2),
+      text(
+          "a flight that leaves its height open has it %.2f m away horizontally: chi2 %.1f with 2 degrees of "
+          "freedom",
+          apart_m, chi2));
+}
+
 std::vector<RangeResidual> residuals_of(const FlightRows& flight, const JointFit& fit, std::size_t index,
                                         const FlightOptions& options) {
   const AnchorBlock& block = fit.normal.anchors[index];

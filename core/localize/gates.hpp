@@ -27,8 +27,8 @@ struct GateLimits {
 };
 
 /// Every gate one flight can ask of one anchor, in a fixed order: redundancy, rejected, geometry, precision,
-/// side, held_height (in the plane), outline (where there is one), blocked, own_delay (not in rooms), residual_scale, chi_square, halves,
-/// second_place, bias, settled.
+/// side, held_height (in the plane), outline (where there is one), blocked, own_delay (not in rooms),
+/// residual_scale, chi_square, halves, second_place, bias, settled.
 ///
 /// chi_square  means of the residuals over two correlation times, each against the residual scale: white
 ///             noise averages out there, an error of the model does not
@@ -48,6 +48,9 @@ Gate moved_gate(const Estimate& now, const Estimate& before, const GateLimits& l
 
 /// The agreement of several flights about their common answer: chi2 with 3 (n - 1) degrees of freedom.
 Gate flights_gate(double chi2, std::size_t n_flights, const GateLimits& limits = {});
+/// A flight that has two places for an anchor, against the common answer of the others: horizontally, the
+/// nearer of its places; chi2 with 2 degrees of freedom. The gate is `flights` too.
+Gate ambiguous_flight_gate(double chi2, double apart_m, const GateLimits& limits = {});
 
 /// Quantile of chi-square, Wilson-Hilferty; within 2 % for 3 and more degrees of freedom.
 double chi2_quantile(double probability, double dof);

@@ -121,7 +121,6 @@ Needs needs_of(Feature feature) {
     case Feature::noise_excess_db:
     case Feature::total_snr_db:
     case Feature::preamble_db:
-    case Feature::fp_index:
     case Feature::kurtosis:
     case Feature::mean_excess_delay_ns:
     case Feature::rms_delay_spread_ns:
@@ -133,6 +132,7 @@ Needs needs_of(Feature feature) {
     case Feature::fp_shape32_db:
     case Feature::max_noise_db:
       return Needs::registers;
+    case Feature::fp_index:
     case Feature::kurtosis_whole:
     case Feature::mean_excess_delay_whole_ns:
     case Feature::rms_delay_spread_whole_ns:
@@ -180,13 +180,13 @@ FeatureVector compute_features(const DiagnosticSample& s) {
   set(out, Feature::heading_deg, s.heading_deg);
   set(out, Feature::kurtosis, s.kurtosis);
   if (s.cir) {
-    if (!s.fp_index) out.set(Feature::fp_index, s.cir->first_path_idx);
     out.set(Feature::kurtosis, s.cir->kurtosis);
     out.set(Feature::mean_excess_delay_ns, s.cir->mean_excess_delay_ns);
     out.set(Feature::rms_delay_spread_ns, s.cir->rms_delay_spread_ns);
     out.set(Feature::early_energy, s.cir->early_energy);
     out.set(Feature::peak_delay_ns, s.cir->peak_delay_ns);
     if (const auto& whole = s.cir->whole) {
+      if (!s.fp_index) out.set(Feature::fp_index, s.cir->first_path_idx);
       out.set(Feature::kurtosis_whole, whole->kurtosis);
       out.set(Feature::mean_excess_delay_whole_ns, whole->mean_excess_delay_ns);
       out.set(Feature::rms_delay_spread_whole_ns, whole->rms_delay_spread_ns);

@@ -40,7 +40,7 @@ enum class Feature : std::size_t {
   fp_shape32_db,     ///< 20 log10(F3 / F2)
   rx_free_space_db,  ///< X = P_RX + 20 log10 R
   fp_free_space_db,  ///< P_FP + 20 log10 R
-  fp_index,          ///< first-path tap
+  fp_index,          ///< first-path tap of the whole record
   max_noise_db,      ///< 20 log10(max noise / s)
   // Over the window of CirOptions, the taps -5 to +44 about the first path, less the noise:
   kurtosis,              ///< eq 5.3

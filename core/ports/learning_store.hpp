@@ -45,6 +45,9 @@ class CampaignStore {
   /// two. Untimed::fresh: rows without a time are all new.
   virtual Result<Appended> append(const CampaignId& id, const std::vector<CampaignRow>& rows,
                                   Untimed untimed = Untimed::known) = 0;
+  /// What append() would do now; nothing is stored.
+  virtual Result<Appended> would_append(const CampaignId& id, const std::vector<CampaignRow>& rows,
+                                        Untimed untimed = Untimed::known) = 0;
 
   struct Setting {
     GroundTruth truth;

@@ -111,11 +111,16 @@ struct Decoder::Values {
     const auto out = value->get<double>();
     return std::isfinite(out) ? std::optional(out) : std::nullopt;
   }
-  /// Exactly, where it is a whole number: a double has no nanoseconds of Unix time.
+  /// Exactly, where it is a whole number, or a text that is one: a double has no nanoseconds of Unix time.
   std::optional<std::uint64_t> whole(const Place& place) const {
     const Json* value = place.in == Place::In::fixed || place.in == Place::In::topic ? nullptr : json(place);
     if (value != nullptr && value->is_number_unsigned()) return value->get<std::uint64_t>();
-    return std::nullopt;
+    if (value == nullptr || !value->is_string()) return std::nullopt;
+    const auto& text = value->get_ref<const std::string&>();
+    std::uint64_t out = 0;
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), out);
+    return !text.empty() && error == std::errc{} && end == text.data() + text.size() ? std::optional(out)
+                                                                                     : std::nullopt;
   }
 };
 
@@ -159,9 +164,14 @@ bool Decoder::range(const Values& values, const device::Arrival& at) {
   if (!(out.distance_m >= k_min_distance_m && out.distance_m <= k_max_distance_m)) return no("out_of_reach");
   out.tag = *tag;
   out.anchor = *anchor;
-  // A level that is absent is not known; one that is there and makes no sense is a mapping that is wrong.
+  // A level that is absent or null is not known; one that is there and makes no sense is a mapping that is
+  // wrong.
   const auto power = [&](const std::optional<Quantity>& from, std::optional<double>& to) {
-    if (!from || values.json(from->at) == nullptr) return true;
+    if (!from) return true;
+    if (from->at.in == Place::In::element || from->at.in == Place::In::message) {
+      const Json* level = values.json(from->at);
+      if (level == nullptr || level->is_null()) return true;
+    }
     const auto value = values.number(from->at);
     if (!value) return false;
     to = *value * from->factor;
@@ -216,7 +226,7 @@ std::optional<UtcTime> Decoder::time(const Values& values, NetworkId tag, const 
         clocks_.erase(tag);
         return no("bad_time");
       }
-      return out_.time().utc_of(steady_of(clock->model, static_cast<std::int64_t>(through), at)).time;
+      return out_.time().utc_of(steady_of(*clock, tag, static_cast<std::int64_t>(through), at)).time;
     }
     if (!(real >= 0 && real < k_most_ns)) return no("bad_time");
     // A real number of seconds holds a quarter of a microsecond at best.
@@ -232,8 +242,44 @@ Decoder::Clock* Decoder::clock_of(NetworkId tag) {
   return &clocks_[tag];
 }
 
-std::int64_t Decoder::steady_of(timing::ClockModel& model, std::int64_t device_ns,
+bool Decoder::Pace::add(std::int64_t device_ns, std::int64_t arrival_ns) {
+  constexpr std::int64_t k_apart_ns = 50'000'000, k_span_ns = 1'000'000'000;
+  constexpr int k_arrivals = 5;
+  const auto begin = [&] {
+    device_ns_ = device_ns;
+    first_ns_ = last_ns_ = arrival_ns;
+    arrivals_ = 1;
+  };
+  if (arrivals_ == 0 || device_ns < device_ns_) begin();
+  // What a link held back and brings at once says nothing of the pace.
+  if (arrival_ns - last_ns_ >= k_apart_ns) {
+    ++arrivals_;
+    last_ns_ = arrival_ns;
+  }
+  const auto passed_ns = arrival_ns - first_ns_;
+  if (arrivals_ < k_arrivals || passed_ns < k_span_ns) return keeps_;
+  const double pace = static_cast<double>(device_ns - device_ns_) / static_cast<double>(passed_ns);
+  keeps_ = pace > 0.1 && pace < 10;
+  begin();
+  return keeps_;
+}
+
+std::int64_t Decoder::steady_of(Clock& clock, NetworkId tag, std::int64_t device_ns,
                                 const device::Arrival& at) {
+  const bool kept = clock.pace.keeps();
+  if (!clock.pace.add(device_ns, at.steady_ns)) {
+    if (kept)
+      out_.notice("the time of " + to_string(tag) +
+                  " does not pass as ours does (it stands still, or its unit is another than the mapping's): "
+                  "ranges are "
+                  "stamped when they arrive");
+    return at.steady_ns;
+  }
+  if (!kept) {
+    out_.notice("");
+    clock.model = timing::ClockModel();
+  }
+  auto& model = clock.model;
   const auto stamp = model.stamp(device_ns, at.steady_ns);
   out_.clock({-model.drift() * 1e6, stamp ? stamp->sigma_ns * 1e-9 : 0, model.settled(),
               model.drift_known() && model.drift_too_large()});

@@ -30,15 +30,29 @@ class Decoder {
 
  private:
   struct Values;
+  /// Whether a counter passes about as time does. One that stands still, or of another unit, would stamp
+  /// ranges by seconds too early.
+  class Pace {
+   public:
+    /// As of now; as before until a second and five arrivals tell.
+    bool add(std::int64_t device_ns, std::int64_t arrival_ns);
+    bool keeps() const { return keeps_; }
+
+   private:
+    std::int64_t device_ns_{}, first_ns_{}, last_ns_{};  ///< at the beginning of the span; newest arrival
+    int arrivals_{0};
+    bool keeps_{true};
+  };
   struct Clock {
     timing::ClockModel model{};
+    Pace pace{};
     std::optional<timing::Unwrap> unwrap{};
   };
   bool range(const Values& values, const device::Arrival& at);
   std::optional<UtcTime> time(const Values& values, NetworkId tag, const device::Arrival& at);
   /// Null: too many tags.
   Clock* clock_of(NetworkId tag);
-  std::int64_t steady_of(timing::ClockModel& model, std::int64_t device_ns, const device::Arrival& at);
+  std::int64_t steady_of(Clock& clock, NetworkId tag, std::int64_t device_ns, const device::Arrival& at);
 
   Mapping mapping_;
   device::DriverOutput& out_;

@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <fstream>
+#include <utility>
 
 #include "core/base/base64.hpp"
 #include "core/base/text.hpp"
@@ -14,7 +15,8 @@ namespace anchord::ntrip {
 namespace {
 
 constexpr std::int64_t k_second_ns = 1'000'000'000;
-constexpr std::int64_t k_answer_ns = 10 * k_second_ns, k_position_ns = 10 * k_second_ns;
+constexpr std::int64_t k_answer_ns = 10 * k_second_ns, k_position_ns = 10 * k_second_ns,
+                       k_silent_ns = 20 * k_second_ns;
 constexpr std::size_t k_most_head = 16'384;
 constexpr std::size_t k_most_chunk = 1 << 20;
 /// Without one good frame in so many bytes the stream is no RTCM 3: a minute of the busiest mounts.
@@ -94,6 +96,7 @@ void Client::opened(const device::Arrival& now) {
   chunked_ = is_table_ = false;
   chunk_left_ = 0;
   frames_ = {};
+  silent_ = false;
   skipped_ = handed_on_ = 0;
   since_frame_ = 0;
   noise_.clear();
@@ -220,8 +223,8 @@ void Client::begin_stream(const device::Arrival& at) {
   identity.model = "NTRIP caster";
   identity.serial = options_.mount;
   out_.identified(identity);
-  deadline_ns_.reset();
-  if (options_.send_gga) send_position(at);
+  stream_since_ns_ = at.steady_ns;
+  stream_tick(at);
   std::string rest;
   rest.swap(held_);
   if (!rest.empty()) stream(rest, at);
@@ -232,7 +235,11 @@ void Client::stream(std::string_view bytes, const device::Arrival& at) {
   const auto before = frames_.base();
   const int good = frames_.feed(bytes);
   hand_on(at);
-  if (good > 0) out_.heard();
+  if (good > 0) {
+    if (std::exchange(silent_, false)) out_.notice("");
+    stream_since_ns_ = at.steady_ns;
+    out_.heard();
+  }
   if (frames_.base() && frames_.base() != before) out_.base(*frames_.base());
   judge_noise(bytes, good);
 }
@@ -304,16 +311,23 @@ void Client::unchunk(std::string_view bytes, const device::Arrival& at) {
   chunked_ = true;
 }
 
-void Client::send_position(const device::Arrival& now) {
-  if (const auto rover = out_.rover_position()) {
-    if (const auto sentence = gga_of(*rover); !sentence.empty()) out_.send(sentence);
-  }
+void Client::stream_tick(const device::Arrival& now) {
   deadline_ns_ = now.steady_ns + k_position_ns;
+  const auto rover = options_.send_gga ? out_.rover_position() : std::nullopt;
+  const auto sentence = rover ? gga_of(*rover) : std::string();
+  if (!sentence.empty()) out_.send(sentence);
+  if (silent_ || now.steady_ns - stream_since_ns_ < k_silent_ns) return;
+  silent_ = true;
+  out_.notice(
+      "mount \"" + options_.mount + "\" is open and sends no corrections" +
+      (options_.send_gga && sentence.empty()
+           ? ": a mount of a network waits for the position of a rover, and there is none with a fix"
+           : ": its base may be switched off; look at it in the caster's table, or choose another mount"));
 }
 
 void Client::tick(const device::Arrival& now) {
   if (!deadline_ns_ || now.steady_ns < *deadline_ns_) return;
-  if (state_ == State::stream) return send_position(now);
+  if (state_ == State::stream) return stream_tick(now);
   if (state_ == State::table) return table_end();
   if (state_ == State::maybe_headers) return begin_stream(now);
   refuse("no answer from the caster within 10 s", 10);

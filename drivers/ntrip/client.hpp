@@ -45,7 +45,8 @@ class Client final : public device::Driver {
   void judge_noise(std::string_view bytes, int good);
   void unchunk(std::string_view bytes, const device::Arrival& at);
   void refuse(const std::string& why, std::int64_t wait_s);
-  void send_position(const device::Arrival& now);
+  /// Every ten seconds of a stream: tells our position, and looks whether anything comes.
+  void stream_tick(const device::Arrival& now);
 
   ClientOptions options_;
   device::DriverOutput& out_;
@@ -62,6 +63,8 @@ class Client final : public device::Driver {
   std::int64_t budget_at_ns_{0};
   bool too_many_{false};
   std::optional<std::int64_t> deadline_ns_{};
+  std::int64_t stream_since_ns_{0};  ///< since when nothing came: begin of the stream, or its newest frame
+  bool silent_{false};
 };
 
 /// A GGA sentence of a rover's position with its CR LF.

@@ -11,6 +11,7 @@ namespace anchord::timing {
 namespace {
 
 constexpr std::int64_t k_bucket_ns = 10'000'000'000;
+constexpr double k_longest_link_s = 5;  ///< what a slow radio or a busy bridge delays at most
 constexpr auto k_other_date_ns = static_cast<std::int64_t>(TimeBase::k_other_date_s * 1e9);
 
 bool possible(std::int64_t utc_ns) {
@@ -228,7 +229,10 @@ std::optional<std::string> TimeBase::skew(const Names& names) const {
              date_of(utc_of(newest_ns_).time.ns) + ", which is used: set the clock of this computer (NTP)";
     }
     return "the system clock is more than " + seconds_text(std::abs(*offset)) +
-           (*offset > 0 ? " ahead of " : " behind ") + whose;
+           (*offset > 0 ? " ahead of " : " behind ") + whose + ": set the clock of this computer (NTP)" +
+           (*offset > 0 && *offset < k_longest_link_s
+                ? "; where that is right, the receiver's link takes so long: give its latency_ms"
+                : "");
   }
   if (!pinned_ns_) return std::nullopt;
   if (!possible(system_ns_ + newest_ns_)) {

@@ -3,6 +3,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <set>
 
@@ -85,7 +86,14 @@ Result<GatheredTraining> gather_table(const TrainArguments& a, ml::Task task) {
       a.features, task == ml::Task::nlos_id || task == ml::Task::los_bias || task == ml::Task::nlos_bias,
       task != ml::Task::nlos_id};
   if (task != ml::Task::nlos_id && task != ml::Task::bias && !table.labelled()) request.need_label = false;
-  if (request.features.empty()) request.features = api::available_features(table, task == ml::Task::nlos_id);
+  std::map<std::string, std::size_t> lacking;
+  if (request.features.empty())
+    request.features = api::available_features(table, task == ml::Task::nlos_id, lacking);
+  for (const auto& [feature, n] : lacking)
+    std::fprintf(stderr,
+                 "anchord train: %s is not used, %zu of %zu rows lack it: name it in --features to leave out "
+                 "those rows\n",
+                 feature.c_str(), n, table.rows());
   std::vector<std::size_t> rows;
   api::Dropped dropped;
   auto data = api::dataset_from(table, request, rows, dropped);

@@ -1,5 +1,6 @@
 #include <cmath>
 #include <map>
+#include <set>
 
 #include "server/storage/known_samples.hpp"
 #include "server/storage/measurement_rows.hpp"
@@ -175,53 +176,20 @@ class SqlCampaignStore final : public CampaignStore {
 
   Result<Appended> append(const CampaignId& id, const std::vector<CampaignRow>& rows,
                           Untimed untimed) override {
-    return write_value<Appended>(gate_, rows.size() + 1, [&](Connection& c) -> Result<Appended> {
-      const auto key = key_of(c, id);
-      if (!key) return no_campaign(id);
-      std::map<std::string, std::pair<std::int64_t, GroundTruth>, std::less<>> known;
-      Query settings(c, std::string("SELECT s.setting_key, ") + k_setting_columns +
-                            " FROM campaign_setting s WHERE s.campaign_key = ?1");
-      settings << *key;
-      while (settings.step()) {
-        const auto setting = settings.integer();
-        auto truth = read_truth(settings);
-        known.try_emplace(truth.setting, setting, truth);
-      }
-      std::map<std::string_view, std::vector<const CampaignSample*>> of_setting;
-      for (const auto& row : rows)
-        if (row.sample.time || untimed == Untimed::known)
-          of_setting[row.truth.setting].push_back(&row.sample);
-      std::map<std::int64_t, KnownSamples> samples;
-      Appended done;
-      for (std::size_t i = 0; i < rows.size(); ++i) {
-        const auto& truth = rows[i].truth;
-        const bool is_new = !known.contains(truth.setting);
-        auto at = known.find(truth.setting);
-        if (at == known.end()) {
-          at = known.try_emplace(truth.setting, insert_setting(c, *key, truth), truth).first;
-        } else if (!same_truth(at->second.second, truth)) {
-          return make_error(Errc::conflict, "row " + std::to_string(i + 1) + ": setting " + truth.setting +
-                                                " exists with other true values");
-        }
-        const auto setting = at->second.first;
-        auto here = samples.find(setting);
-        if (here == samples.end())
-          here = samples
-                     .try_emplace(setting, c, setting,
-                                  is_new ? std::vector<const CampaignSample*>{} : of_setting[truth.setting])
-                     .first;
-        CampaignSample sample = rows[i].sample;
-        if ((sample.time || untimed == Untimed::known) && here->second.take(sample)) {
-          ++done.duplicates;
-          continue;
-        }
-        // Again where another server has just taken the number.
-        do sample.seq = here->second.free_seq(sample);
-        while (!insert_sample(c, setting, sample));
-        ++done.accepted;
-      }
-      return done;
+    return write_value<Appended>(gate_, rows.size() + 1,
+                                 [&](Connection& c) { return append_to(c, id, rows, untimed); });
+  }
+
+  Result<Appended> would_append(const CampaignId& id, const std::vector<CampaignRow>& rows,
+                                Untimed untimed) override {
+    std::optional<Appended> would;
+    auto undone = write_value<Appended>(gate_, rows.size() + 1, [&](Connection& c) -> Result<Appended> {
+      BOOST_OUTCOME_TRY(const auto done, append_to(c, id, rows, untimed));
+      would = done;
+      return make_error(Errc::conflict, "a dry run is taken back");
     });
+    if (would) return *would;
+    return undone;
   }
 
   Result<std::vector<Setting>> settings(const CampaignId& id) override {
@@ -297,6 +265,58 @@ class SqlCampaignStore final : public CampaignStore {
   }
 
  private:
+  static Result<Appended> append_to(Connection& c, const CampaignId& id, const std::vector<CampaignRow>& rows,
+                                    Untimed untimed) {
+    const auto key = key_of(c, id);
+    if (!key) return no_campaign(id);
+    std::map<std::string, std::pair<std::int64_t, GroundTruth>, std::less<>> known;
+    Query settings(c, std::string("SELECT s.setting_key, ") + k_setting_columns +
+                          " FROM campaign_setting s WHERE s.campaign_key = ?1");
+    settings << *key;
+    while (settings.step()) {
+      const auto setting = settings.integer();
+      auto truth = read_truth(settings);
+      known.try_emplace(truth.setting, setting, truth);
+    }
+    std::map<std::string_view, std::vector<const CampaignSample*>> of_setting;
+    for (const auto& row : rows)
+      if (row.sample.time || untimed == Untimed::known) of_setting[row.truth.setting].push_back(&row.sample);
+    std::map<std::int64_t, KnownSamples> samples;
+    std::set<std::string_view> of_file;
+    Appended done;
+    for (std::size_t i = 0; i < rows.size(); ++i) {
+      const auto& truth = rows[i].truth;
+      const bool is_new = !known.contains(truth.setting);
+      auto at = known.find(truth.setting);
+      if (at == known.end()) {
+        at = known.try_emplace(truth.setting, insert_setting(c, *key, truth), truth).first;
+        of_file.insert(truth.setting);
+      } else if (!same_truth(at->second.second, truth)) {
+        return make_error(Errc::conflict, "data row " + std::to_string(i + 1) + ": setting " + truth.setting +
+                                              " has other true values than " +
+                                              (of_file.contains(truth.setting) ? "in an earlier row"
+                                                                               : "those of the campaign"));
+      }
+      const auto setting = at->second.first;
+      auto here = samples.find(setting);
+      if (here == samples.end())
+        here = samples
+                   .try_emplace(setting, c, setting,
+                                is_new ? std::vector<const CampaignSample*>{} : of_setting[truth.setting])
+                   .first;
+      CampaignSample sample = rows[i].sample;
+      if ((sample.time || untimed == Untimed::known) && here->second.take(sample)) {
+        ++done.duplicates;
+        continue;
+      }
+      // Again where another server has just taken the number.
+      do sample.seq = here->second.free_seq(sample);
+      while (!insert_sample(c, setting, sample));
+      ++done.accepted;
+    }
+    return done;
+  }
+
   static std::optional<Error> name_taken(Connection& c, const CampaignRecord& campaign) {
     Query query(c, k_campaign_named);
     query << campaign.name << campaign.id;

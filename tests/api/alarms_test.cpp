@@ -104,6 +104,22 @@ TEST(AlarmRules, CallClocksThatDifferBeyondDoubt) {
   EXPECT_EQ(raised(f), "") << "within what the flight can tell";
 }
 
+TEST(AlarmRules, CallRangesThatAreStampedAfterTheyArrive) {
+  auto f = well();
+  flight::FlightWatch watch;
+  const auto take = [&](double stamp_s, double received_s) {
+    for (int i = 0; i < 20; ++i) watch.note_range(at(stamp_s), at(received_s));
+    f.ahead_s = watch.look(at(stamp_s), {}).ahead_s;
+  };
+  take(99.8, 100);
+  EXPECT_EQ(raised(f), "");
+  take(112, 100);
+  EXPECT_EQ(raised(f), "clock.skew");
+  watch.note_range(at(100), at(100));
+  f.ahead_s = watch.look(at(112), {}).ahead_s;
+  EXPECT_EQ(raised(f), "") << "one that is right: what the others waited for is not known";
+}
+
 TEST(AlarmRules, CallATagThatTheMissionDoesNotHaveUntilItHasBeenSilentForTenSeconds) {
   auto f = well();
   flight::FlightWatch watch;

@@ -112,6 +112,43 @@ TEST_F(AnchorFiles, OfASiteAreRefusedWhereItsAnchorsMayBeThoseInNoSiteWhichSaySo
 }
 
 // A model that joins the files of two servers would take two projects of one GlobalId for one.
+// A tool that mirrors what it reads would take an empty answer for anchors that are all gone.
+TEST_F(AnchorFiles, OfASiteThatIsNoneAreRefusedAndNotEmpty) {
+  publish(true);
+  const std::string unknown = "0197a3b0-5d10-7b1e-9c55-0a1b2c3d4e5f";
+  for (const char* format : {"geojson", "csv", "kml", "gpkg", "dxf", "ifc"}) {
+    EXPECT_EQ(file(format, {{"site", "Ghent"}}).status, 422) << format;
+    EXPECT_EQ(file(format, {{"site", unknown}}).status, 404) << format;
+  }
+  EXPECT_EQ(get("/api/v1/exports/anchors.csv", {{"site", unknown}}).status, 404);
+  EXPECT_EQ(get("/api/v1/buildings", {{"site", "Ghent"}}).status, 422);
+  EXPECT_EQ(get("/api/v1/buildings", {{"site", unknown}}).status, 404);
+}
+
+// RFC 9110, section 12.5.1.
+TEST_F(AnchorFiles, AreInTheFormatThatAcceptWantsMost) {
+  publish(true);
+  const auto type = [&](const std::string& accept) {
+    Call options;
+    options.headers["accept"] = accept;
+    const auto got = call(api::Method::get, "/api/v1/anchors", "", options);
+    return got.status == 200 ? header(got, "Content-Type").substr(0, header(got, "Content-Type").find(';'))
+                             : std::to_string(got.status);
+  };
+  EXPECT_EQ(type("*/*"), "application/geo+json");
+  EXPECT_EQ(type("text/html, application/xhtml+xml, */*;q=0.8"), "application/geo+json");
+  EXPECT_EQ(type("text/csv, */*;q=0.1"), "text/csv");
+  EXPECT_EQ(type("application/geo+json;q=0, text/csv"), "text/csv");
+  EXPECT_EQ(type("text/csv; q=0.9, application/geo+json;q=0.4"), "text/csv");
+  EXPECT_EQ(type("TEXT/CSV"), "text/csv");
+  EXPECT_EQ(type("text/*"), "text/csv");
+  EXPECT_EQ(type("application/geopackage+sqlite3"), "application/geopackage+sqlite3");
+  EXPECT_EQ(type("application/vnd.google-earth.kml+xml"), "application/vnd.google-earth.kml+xml");
+  EXPECT_EQ(type("application/json, application/geo+json, application/problem+json"), "application/geo+json");
+  EXPECT_EQ(type("image/png"), "406");
+  EXPECT_EQ(type("text/csv;q=0"), "406");
+}
+
 TEST_F(AnchorFiles, IfcProjectsOfTwoSitesOfOneNameHaveTheirOwnGlobalIds) {
   publish(true);
   const auto project = [&] {

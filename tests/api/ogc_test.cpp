@@ -131,6 +131,10 @@ TEST_F(Ogc, ATimeMayHaveAnOffset) {
   EXPECT_EQ(items("anchors", {{"datetime", shifted(2, "+02:00")}})["numberMatched"], 2);
   EXPECT_EQ(items("anchors", {{"datetime", shifted(-3, "-03:00")}})["numberMatched"], 2);
   EXPECT_EQ(items("anchors", {{"datetime", shifted(0, "+02:00")}})["numberMatched"], 0);
+  // As the server writes it, and as a mirror asks for what it has seen and for what is newer.
+  EXPECT_EQ(items("anchors", {{"datetime", when}})["numberMatched"], 2);
+  EXPECT_EQ(items("anchors", {{"datetime", when + "/" + when}})["numberMatched"], 2);
+  EXPECT_EQ(items("anchors", {{"datetime", "../" + when}})["numberMatched"], 2);
   items("anchors", {{"datetime", shifted(0, "+2:00")}}, 400);
   items("anchors", {{"datetime", shifted(0, "+25:00")}}, 400);
 }

@@ -61,5 +61,37 @@ TEST_F(Freeze, AFlightDeletedWhileItIsFrozenIsFrozenWholeOrNotAtAll) {
   RecordProperty("refused", refused);
 }
 
+TEST_F(Freeze, TwoFlightsOfOneNameAreTwoPlaces) {
+  std::string missions;
+  for (const bool los : {true, false}) {
+    Mission mission;
+    mission.id.uuid = make_uuid_v7(clock_.now());
+    mission.name = "calibration";
+    mission.created = clock_.now();
+    mission.state = MissionState::finished;
+    ASSERT_TRUE(database_->stores().missions.insert(mission).has_value());
+    std::vector<Range> ranges(20);
+    for (int i = 0; i < 20; ++i) {
+      auto& range = ranges[static_cast<std::size_t>(i)];
+      range.mission = mission.id;
+      range.time = UtcTime{1'700'000'000'000'000'000 + i * 10'000'000LL};
+      range.tag = NetworkId{0x6e01};
+      range.anchor = NetworkId{0x6a21};
+      range.distance_m = 5;
+    }
+    ASSERT_TRUE(database_->stores().measurements.append_ranges(std::move(ranges), true).has_value());
+    RangeTruth truth;
+    truth.distance_m = 4.9;
+    truth.los = los;
+    ASSERT_EQ(database_->stores().labels.label({mission.id, {}, {}, {}, {}}, truth).value(), 20);
+    missions += (missions.empty() ? "\"" : ",\"") + to_string(mission.id) + '"';
+  }
+  const auto made = post("/api/v1/datasets", R"({"name":"both","missions":[)" + missions +
+                                                 R"(],"aggregation":"none","split":{"test_share":0.5}})");
+  ASSERT_EQ(made.status, 201) << made.body;
+  EXPECT_EQ(json(made)["train"], 20);
+  EXPECT_EQ(json(made)["test"], 20);
+}
+
 }  // namespace
 }  // namespace anchord::test::freeze_test

@@ -50,9 +50,11 @@ TEST_P(RealSet, HoldsItsFigureOnPlacesItHasNotSeen) {
   const bool identify = c.task == ml::Task::nlos_id;
   std::vector<std::size_t> rows;
   Dropped dropped;
-  auto data = dataset_from(table.value(),
-                           {available_features(table.value(), identify), table.value().labelled(), !identify},
-                           rows, dropped);
+  std::map<std::string, std::size_t> lacking;
+  auto data = dataset_from(
+      table.value(),
+      {available_features(table.value(), identify, lacking), table.value().labelled(), !identify}, rows,
+      dropped);
   ASSERT_TRUE(data) << data.error().message;
   if (c.task == ml::Task::los_bias || c.task == ml::Task::nlos_bias)
     data = data.value().of_class(c.task == ml::Task::los_bias);

@@ -161,6 +161,22 @@ TEST_F(ForeignCampaigns, AManifestFromElsewhereDoesNotSayThatItsDataAreThoseOfTh
   EXPECT_EQ(on_places, 1) << gate;
 }
 
+TEST_F(ForeignCampaigns, TheSameSamplesInMillimetresOrCentimetresAreDuplicates) {
+  const auto csv = [](int per_m, const std::string& unit) {
+    std::string out = "environment,setting,true_distance_" + unit + ",los,range_" + unit + "\n";
+    for (int i = 0; i < 500; ++i) {
+      char row[80];
+      const double range = (5.0 + 0.01 * i) * per_m;
+      std::snprintf(row, sizeof row, "lab,s,%d,1,%.*f\n", 5 * per_m, per_m == 1 ? 2 : 0, range);
+      out += row;
+    }
+    return out;
+  };
+  EXPECT_EQ(send(csv(1, "m"))["accepted"], 500);
+  EXPECT_EQ(send(csv(100, "cm"))["duplicates"], 500);
+  EXPECT_EQ(send(csv(1000, "mm"))["duplicates"], 500);
+}
+
 TEST_F(ForeignCampaigns, AModelOfNanosecondsIsRefused) {
   const auto run = trained_on("ns", room("ns", 0.1, 3.33564));
   const auto refused = promote(run);

@@ -494,6 +494,14 @@ TEST_F(LearningService, PredictsAndSaysWhatASampleLacks) {
   const auto run = train("nlos_id", "logistic");
   ASSERT_EQ(promote(run).status, 200);
   const auto judged = json(post("/api/v1/models/active/predict", sample));
+  const std::string registers =
+      R"("cir_power":11855,"preamble_count":611,"fp_amp1":18712,"fp_amp2":10250,"fp_amp3":11576)";
+  const auto p_los = [&](const std::string& more) {
+    return json(
+        post("/api/v1/models/active/predict", R"({"sample":{"distance_m":6,)" + more + "}}"))["p_los"];
+  };
+  EXPECT_EQ(p_los(registers + R"(,"rx_dbm":-70,"fp_dbm":-72)"), p_los(registers))
+      << "as in training, levels are those of the registers where both are given";
   EXPECT_EQ(judged["los"], true);
   EXPECT_GT(judged["p_los"], 0.5);
   EXPECT_EQ("/api/v1/models/" + judged["models"].value("nlos_id", ""), run["model"]);

@@ -282,6 +282,13 @@ TEST(LiveMission, AlarmsKnowOfCorrectionsThatMoveAnchorsAndOfThoseNotApplied) {
   EXPECT_EQ(pulse(*without).models_withheld, "");
   EXPECT_EQ(pulse(*kept).models_withheld, withheld.withheld);
   EXPECT_EQ(pulse(*kept).models_moved, "");
+  LiveMission silent(setup_of(data));
+  for (auto row : stream(data)) {
+    if (auto* judged = std::get_if<flight::PredictedRange>(&row)) judged->silent = true;
+    silent.add(row);
+  }
+  EXPECT_NE(pulse(silent).models_withheld.find("lack what they need"), std::string_view::npos)
+      << "models that say nothing of a whole flight";
   const auto before = without->estimates(), after = kept->estimates();
   ASSERT_EQ(before.size(), after.size());
   for (std::size_t i = 0; i < before.size(); ++i)

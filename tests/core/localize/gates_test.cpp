@@ -184,6 +184,30 @@ TEST(Gates, TellAMovedAnchorFromOneThatStayed) {
   EXPECT_FALSE(gate(fuse_estimates(moved), "flights").passed);
 }
 
+// One ring at one height leaves the height open, and knows very well where an anchor hangs horizontally.
+TEST(Gates, HoldBackAnAnchorThatASecondFlightOfOneHeightHasElsewhere) {
+  MadeFlight first;
+  first.turn_rate_radps = 0.2;
+  const auto before = solve_flight(make_flight(first));
+  ASSERT_TRUE(before);
+  Estimate known = before.value().anchors[0].estimate;
+  ASSERT_TRUE(known.acceptable()) << known.reason;
+  const auto second = [&](const Eigen::Vector3d& moved) {
+    Estimate out = known;
+    out.verdict = Verdict::ambiguous;
+    out.best->position.m += moved;
+    out.mirror = out.best;
+    out.mirror->position.m.z() -= 4;
+    return out;
+  };
+  const Estimate stayed[] = {known, second({0, 0, 1.5})}, moved[] = {known, second({2, 0, 0})};
+  EXPECT_TRUE(fuse_estimates(stayed).acceptable());
+  const Estimate held = fuse_estimates(moved);
+  EXPECT_FALSE(held.acceptable());
+  EXPECT_FALSE(gate(held, "flights").passed);
+  EXPECT_NE(held.reason.find("2.00 m away horizontally"), std::string::npos) << held.reason;
+}
+
 // Every range to one anchor goes through a wall: half a metre and an exponential delay on top. It fits a
 // place behind the anchor, and only beside the others it shows.
 TEST(Gates, HoldBackAnAnchorWhoseRangesAreAllBlocked) {

@@ -80,9 +80,9 @@ TEST(Features, AtRestAreMediansAndTheirSpreads) {
 TEST(Features, OfRangesOfAFlightAreThoseOfLevelsAndImpulseResponse) {
   std::size_t live = 0;
   for (std::size_t f = 0; f < k_feature_count; ++f) live += live_ranges_have(static_cast<Feature>(f)) ? 1 : 0;
-  EXPECT_EQ(live, 16U);
+  EXPECT_EQ(live, 15U);
   for (const char* name : {"height_difference_m", "heading_deg", "log_range_spread", "fp_snr_db",
-                           "max_noise_db", "rms_delay_spread_whole_ns"})
+                           "max_noise_db", "fp_index", "rms_delay_spread_whole_ns"})
     EXPECT_FALSE(live_ranges_have(*feature_of(name))) << name;
   EXPECT_EQ(needs_of(Feature::kurtosis), Needs::impulse);
 }

@@ -123,6 +123,50 @@ TEST(Ndjson, FollowsTheOwnClockOfADeviceOverItsWrap) {
   EXPECT_EQ(line.sink.drops["bad_time"], 2u);
 }
 
+TEST(Ndjson, StampsByTheArrivalWhereTheOwnClockOfADeviceStandsStillOrHasAnotherUnitAndSaysSo) {
+  // Ten ranges a second; the mapping takes the counter for milliseconds.
+  for (const std::int64_t per_range : {0, 100'000'000}) {  // frozen; in truth nanoseconds
+    Line line(R"({"tag":"/t","anchor":"/a","distance":{"pointer":"/d","unit":"m"},
+      "time":{"pointer":"/ms","unit":"ms","clock":"device"}})");
+    const auto say = [&](std::int64_t count) {
+      line.now_ns += 100'000'000;
+      line.say(R"({"t":1,"a":2,"d":3,"ms":)" + std::to_string(count) + "}\n");
+      return line.sink.ranges.back().time.ns - k_start_ns - line.now_ns;
+    };
+    std::int64_t worst_ns = 0;
+    for (std::int64_t i = 0; i < 100; ++i) {
+      const auto off_ns = say(1000 + i * per_range);
+      if (i >= 20) worst_ns = std::max(worst_ns, std::abs(off_ns));
+    }
+    EXPECT_EQ(worst_ns, 0) << per_range;
+    EXPECT_NE(line.sink.notices[1].find("0x0001 does not pass as ours does"), std::string::npos)
+        << line.sink.notices[1];
+    // It is corrected: nothing is left of it.
+    for (std::int64_t i = 0; i < 100; ++i) say(i * 100);
+    EXPECT_EQ(line.sink.notices[1], "") << per_range;
+  }
+}
+
+TEST(Ndjson, KeepsTheOwnClockOfADeviceOverALinkThatHoldsEverythingBackForFiveSeconds) {
+  Line line(R"({"tag":"/t","anchor":"/a","distance":{"pointer":"/d","unit":"m"},
+    "time":{"pointer":"/ms","unit":"ms","clock":"device"}})");
+  for (std::int64_t i = 0; i < 400; ++i) {
+    const std::int64_t measured_ns = 5'000'000'000 + i * 100'000'000;
+    line.now_ns = i >= 200 && i < 250 ? 5'000'000'000 + 25'000'000'000 : measured_ns;
+    line.say(R"({"t":1,"a":2,"d":3,"ms":)" + std::to_string(i * 100) + "}\n");
+    EXPECT_EQ(line.sink.notices[1], "") << i;
+  }
+}
+
+TEST(Ndjson, TakesALevelThatIsNullForUnknownAndANumberInTextForASequence) {
+  Line line(R"({"tag":"/t","anchor":"/a","distance":{"pointer":"/d","unit":"m"},"rss":"/p","seq":"/n"})");
+  line.say(R"({"t":1,"a":2,"d":3,"p":null,"n":"4711"})"
+           "\n");
+  ASSERT_EQ(line.sink.ranges.size(), 1u);
+  EXPECT_FALSE(line.sink.ranges[0].rss_dbm);
+  EXPECT_EQ(line.sink.ranges[0].seq, 4711u);
+}
+
 /// Reasons by what was said, each line by itself.
 std::map<std::string, std::uint64_t> drops_of(const std::string& mapping, const std::string& text) {
   Line line(mapping);

@@ -198,6 +198,29 @@ TEST(NtripClient, AStreamWithoutAFrameEndsAfter64KiBAndAMixedOneIsNamed) {
   EXPECT_EQ(link.to_rover(), k_1005);
 }
 
+TEST(NtripClient, AMountThatSendsNothingIsNamedUntilAFrameComes) {
+  Link link;
+  link.take(EventKind::opened, 2);
+  link.take(EventKind::bytes, 2, "ICY 200 OK\r\n\r\n");
+  const auto wait = [&](int seconds) {
+    for (int i = 0; i < seconds; ++i) {
+      link.now_ns += 1'000'000'000;
+      link.take(EventKind::tick, 2);
+    }
+  };
+  wait(15);
+  EXPECT_EQ(link.sink.notices[2], "");
+  wait(10);
+  EXPECT_NE(link.sink.notices[2].find(
+                "sends no corrections: a mount of a network waits for the position of a rover"),
+            std::string::npos)
+      << link.sink.notices[2];
+  link.take(EventKind::bytes, 2, k_1005);
+  EXPECT_EQ(link.sink.notices[2], "");
+  wait(25);
+  EXPECT_NE(link.sink.notices[2].find("sends no corrections"), std::string::npos);
+}
+
 TEST(NtripClient, AFloodOfGoodFramesIsHeldToWhatAReceiversLinkCarries) {
   Link link;
   link.take(EventKind::opened, 2);

@@ -56,10 +56,16 @@ TEST(TimeBase, NamesTheSameSkewInTheSameWordsUntilItIsAnother) {
     }
     return base.skew().value_or("");
   };
-  EXPECT_EQ(skew_at(-300'000'000), "the system clock is more than 0.2 s behind the receiver's UTC");
+  EXPECT_EQ(
+      skew_at(-300'000'000),
+      "the system clock is more than 0.2 s behind the receiver's UTC: set the clock of this computer (NTP)");
   EXPECT_EQ(skew_at(-301'000'000), skew_at(-400'000'000)) << "an acknowledged alarm stays acknowledged";
   EXPECT_NE(skew_at(-301'000'000), skew_at(-600'000'000));
   EXPECT_EQ(skew_at(0), "");
+  EXPECT_NE(skew_at(600'000'000)
+                .find("(NTP); where that is right, the receiver's link takes so long: give its latency_ms"),
+            std::string::npos)
+      << skew_at(600'000'000);
 }
 
 TEST(TimeBase, IsQuietWhileTheSystemClockIsRight) {

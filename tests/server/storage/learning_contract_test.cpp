@@ -122,6 +122,9 @@ TEST_P(LearningStoreContract, FiltersSamplesByDistanceLevelAndLabel) {
 TEST_P(LearningStoreContract, CountsARepeatedSampleAndRefusesAnotherTruthForASettingWhole) {
   const auto c = stored_campaign();
   ASSERT_TRUE(db_->stores().campaigns.append(c.id, {row("a", 5.2, 1)}));
+  const auto would = db_->stores().campaigns.would_append(c.id, {row("a", 5.2, 1), row("a", 5.3, 2)}).value();
+  EXPECT_EQ(would.accepted, 1u);
+  EXPECT_EQ(would.duplicates, 1u);
   const auto again = db_->stores().campaigns.append(c.id, {row("a", 5.2, 1), row("a", 5.3, 2)}).value();
   EXPECT_EQ(again.accepted, 1u);
   EXPECT_EQ(again.duplicates, 1u);
