@@ -11,6 +11,20 @@
 namespace anchord::test::freeze_test {
 namespace {
 
+/// A hundred a second to one anchor, all alike.
+std::vector<Range> ranges_of(const Mission& mission, int n) {
+  std::vector<Range> ranges(static_cast<std::size_t>(n));
+  for (int i = 0; i < n; ++i) {
+    auto& range = ranges[static_cast<std::size_t>(i)];
+    range.mission = mission.id;
+    range.time = UtcTime{1'700'000'000'000'000'000 + i * 10'000'000LL};
+    range.tag = NetworkId{0x6e01};
+    range.anchor = NetworkId{0x6a21};
+    range.distance_m = 5;
+  }
+  return ranges;
+}
+
 using Freeze = AppFixture;
 
 TEST_F(Freeze, AFlightDeletedWhileItIsFrozenIsFrozenWholeOrNotAtAll) {
@@ -23,16 +37,7 @@ TEST_F(Freeze, AFlightDeletedWhileItIsFrozenIsFrozenWholeOrNotAtAll) {
     mission.created = clock_.now();
     mission.state = MissionState::finished;
     ASSERT_TRUE(database_->stores().missions.insert(mission).has_value());
-    std::vector<Range> ranges(k_rows);
-    for (int i = 0; i < k_rows; ++i) {
-      auto& range = ranges[static_cast<std::size_t>(i)];
-      range.mission = mission.id;
-      range.time = UtcTime{1'700'000'000'000'000'000 + i * 10'000'000LL};
-      range.tag = NetworkId{0x6e01};
-      range.anchor = NetworkId{0x6a21};
-      range.distance_m = 5;
-    }
-    ASSERT_TRUE(database_->stores().measurements.append_ranges(std::move(ranges), true).has_value());
+    ASSERT_TRUE(database_->stores().measurements.append_ranges(ranges_of(mission, k_rows), true).has_value());
     RangeTruth truth;
     truth.distance_m = 4.9;
     truth.los = true;
@@ -70,16 +75,7 @@ TEST_F(Freeze, TwoFlightsOfOneNameAreTwoPlaces) {
     mission.created = clock_.now();
     mission.state = MissionState::finished;
     ASSERT_TRUE(database_->stores().missions.insert(mission).has_value());
-    std::vector<Range> ranges(20);
-    for (int i = 0; i < 20; ++i) {
-      auto& range = ranges[static_cast<std::size_t>(i)];
-      range.mission = mission.id;
-      range.time = UtcTime{1'700'000'000'000'000'000 + i * 10'000'000LL};
-      range.tag = NetworkId{0x6e01};
-      range.anchor = NetworkId{0x6a21};
-      range.distance_m = 5;
-    }
-    ASSERT_TRUE(database_->stores().measurements.append_ranges(std::move(ranges), true).has_value());
+    ASSERT_TRUE(database_->stores().measurements.append_ranges(ranges_of(mission, 20), true).has_value());
     RangeTruth truth;
     truth.distance_m = 4.9;
     truth.los = los;
