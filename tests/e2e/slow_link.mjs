@@ -31,6 +31,7 @@ export async function slowLink(port, { bytes_per_s = 125_000, delay_ms = 150 } =
     let timer;
     const pump = () => {
       timer = undefined;
+      if (to.destroyed) queue.length = 0; // nobody waits for it: a link that stays cut would keep the process for good
       while (whole && queue.length && queue[0].at_ms <= performance.now()) {
         const { piece } = queue.shift();
         if (!to.writable) continue;
