@@ -72,7 +72,7 @@ ChecklistItem battery_item(const DroneStatus& d, const ChecklistFacts& f) {
         flight_s / 60, f.endurance_s / 60);
   else if (fresh)
     text = words("%.0f %% left, %.0f %% needed", 100 * *d.battery, 100 * need) +
-           words(" (a full one is taken to last %.0f min)", f.endurance_s / 60);
+           words(" (endurance on a full battery: %.0f min)", f.endurance_s / 60);
   return item("battery", "The battery covers the plan plus 30 % reserve",
               fresh && d.battery_warning == 0 && *d.battery >= need, true, text);
 }

@@ -1,5 +1,6 @@
 #include "drivers/mapping/decoder.hpp"
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <nlohmann/json.hpp>
@@ -269,15 +270,16 @@ std::int64_t Decoder::steady_of(Clock& clock, NetworkId tag, std::int64_t device
   const bool kept = clock.pace.keeps();
   if (!clock.pace.add(device_ns, at.steady_ns)) {
     if (kept)
-      out_.notice("the time of " + to_string(tag) +
-                  " does not pass as ours does (it stands still, or its unit is another than the mapping's): "
-                  "ranges are "
-                  "stamped when they arrive");
+      out_.notice(
+          "the clock of " + to_string(tag) +
+          " does not run at our rate (it stands still, or the unit in the mapping is wrong): its ranges are "
+          "stamped on arrival");
     return at.steady_ns;
   }
   if (!kept) {
-    out_.notice("");
     clock.model = timing::ClockModel();
+    const bool all_run = std::ranges::all_of(clocks_, [](const auto& c) { return c.second.pace.keeps(); });
+    if (all_run) out_.notice("");
   }
   auto& model = clock.model;
   const auto stamp = model.stamp(device_ns, at.steady_ns);

@@ -30,7 +30,7 @@ class Decoder {
 
  private:
   struct Values;
-  /// Whether a counter passes about as time does. One that stands still, or of another unit, would stamp
+  /// Whether a counter runs at about the rate of time. One that stands still, or of another unit, would stamp
   /// ranges by seconds too early.
   class Pace {
    public:

@@ -71,10 +71,10 @@ TEST(Checklist, TheBatteryThatAFlightNeedsFollowsTheEnduranceOfTheAircraft) {
     return *std::find_if(list.begin(), list.end(), [](const auto& i) { return i.id == "battery"; });
   };
   EXPECT_FALSE(battery().green());
-  EXPECT_EQ(battery().detail, "70 % left, 95 % needed (a full one is taken to last 20 min)");
+  EXPECT_EQ(battery().detail, "70 % left, 95 % needed (endurance on a full battery: 20 min)");
   facts.endurance_s = 2400;
   EXPECT_TRUE(battery().green());
-  EXPECT_NE(battery().detail.find("needed (a full one is taken to last 40 min)"), std::string::npos)
+  EXPECT_NE(battery().detail.find("needed (endurance on a full battery: 40 min)"), std::string::npos)
       << battery().detail;
   check.time.expected_s = 2400;
   facts.drone->battery = 1;

@@ -139,12 +139,32 @@ TEST(Ndjson, StampsByTheArrivalWhereTheOwnClockOfADeviceStandsStillOrHasAnotherU
       if (i >= 20) worst_ns = std::max(worst_ns, std::abs(off_ns));
     }
     EXPECT_EQ(worst_ns, 0) << per_range;
-    EXPECT_NE(line.sink.notices[1].find("0x0001 does not pass as ours does"), std::string::npos)
+    EXPECT_NE(line.sink.notices[1].find("0x0001 does not run at our rate"), std::string::npos)
         << line.sink.notices[1];
     // It is corrected: nothing is left of it.
     for (std::int64_t i = 0; i < 100; ++i) say(i * 100);
     EXPECT_EQ(line.sink.notices[1], "") << per_range;
   }
+}
+
+TEST(Ndjson, NamesATagWhoseClockStandsStillUntilNoneDoes) {
+  Line line(R"({"tag":"/t","anchor":"/a","distance":{"pointer":"/d","unit":"m"},
+    "time":{"pointer":"/ms","unit":"ms","clock":"device"}})");
+  const auto say = [&](int tag, std::int64_t count) {
+    line.say(R"({"t":)" + std::to_string(tag) + R"(,"a":9,"d":3,"ms":)" + std::to_string(count) + "}\n");
+  };
+  std::int64_t i = 0;
+  const auto pass = [&](bool first_runs) {
+    for (const auto end = i + 50; i < end; ++i) {
+      line.now_ns += 100'000'000;
+      say(1, first_runs ? i * 100 : 7);
+      say(2, 7);
+    }
+  };
+  pass(false);
+  EXPECT_NE(line.sink.notices[1], "");
+  pass(true);
+  EXPECT_NE(line.sink.notices[1], "") << "0x0002 still stands still";
 }
 
 TEST(Ndjson, KeepsTheOwnClockOfADeviceOverALinkThatHoldsEverythingBackForFiveSeconds) {

@@ -274,7 +274,7 @@ const FIELDS: readonly (readonly [NumberSetting, string, number])[] = [
   ['max_height_m', 'Highest, m', 1],
   ['speed_mps', 'Speed, m/s', 1],
   ['dwell_s', 'Dwell, s', 1],
-  ['endurance_s', 'Full battery, s', 0],
+  ['endurance_s', 'Endurance, s', 0],
   ['k', 'Steps k', 0],
   ['grid_step_m', 'Grid step, m', 1],
   ['target_sigma_m', 'Target σ, m', 3],
